@@ -1,0 +1,55 @@
+# How every target of the project is compiled, and the one way to declare a module or a test.
+
+find_package(Threads REQUIRED)
+
+# The same bits on every target: no fused multiply-add, never -ffast-math. The other two keep the bits and let loops
+# vectorise.
+add_library(spinaltap_flags INTERFACE)
+target_compile_options(spinaltap_flags INTERFACE -ffp-contract=off -fno-math-errno -fno-trapping-math
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror)
+target_include_directories(spinaltap_flags INTERFACE ${CMAKE_SOURCE_DIR})
+if(EMSCRIPTEN)
+  # Debian's header-only libraries, through a folder of links: -I/usr/include would shadow the sysroot.
+  set(links ${CMAKE_BINARY_DIR}/header_only)
+  file(MAKE_DIRECTORY ${links})
+  foreach(library tl eigen3)
+    file(CREATE_LINK /usr/include/${library} ${links}/${library} SYMBOLIC)
+  endforeach()
+  target_include_directories(spinaltap_flags SYSTEM INTERFACE ${links} ${links}/eigen3)
+  target_compile_options(spinaltap_flags INTERFACE -msimd128)
+else()
+  target_include_directories(spinaltap_flags SYSTEM INTERFACE /usr/include/eigen3)
+  target_link_libraries(spinaltap_flags INTERFACE Threads::Threads)
+endif()
+
+# spinaltap_module(core rbf DEPS base): a static library spinaltap_core_rbf of every .cpp in its own folder.
+function(spinaltap_module room name)
+  cmake_parse_arguments(ARG "" "" "DEPS;LIBRARIES" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  set(target spinaltap_${room}_${name})
+  if(sources)
+    add_library(${target} STATIC ${sources})
+    set(scope PUBLIC)
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  target_link_libraries(${target} ${scope} spinaltap_flags ${ARG_LIBRARIES})
+  foreach(dep ${ARG_DEPS})
+    target_link_libraries(${target} ${scope} spinaltap_${dep})
+  endforeach()
+endfunction()
+
+# spinaltap_test(core_rbf DEPS core_rbf core_phantom): one program and one ctest entry of every *_test.cpp in its folder.
+function(spinaltap_test name)
+  cmake_parse_arguments(ARG "" "" "DEPS;LIBRARIES;LABELS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
+  set(target test_${name})
+  add_executable(${target} ${sources})
+  target_link_libraries(${target} PRIVATE spinaltap_flags spinaltap_gtest ${ARG_LIBRARIES})
+  foreach(dep ${ARG_DEPS})
+    target_link_libraries(${target} PRIVATE spinaltap_${dep})
+  endforeach()
+  add_test(NAME ${name} COMMAND ${target})
+  set_tests_properties(${name} PROPERTIES TIMEOUT 900 LABELS "${ARG_LABELS}")
+endfunction()

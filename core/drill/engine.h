@@ -1,0 +1,57 @@
+// core/drill/engine.h - exact removal of points by the bit, one pose a cycle.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "core/base/result.h"
+#include "core/base/vec3.h"
+#include "core/plan/path.h"
+#include "core/point_volume/point_volume.h"
+
+namespace spinaltap::drill {
+
+/// Where the bit is, in the path frame.
+struct BitPose {
+  Vec3 tip_mm;         ///< the apex of the cone
+  Vec3 axis{0, 0, 1};  ///< unit vector from the shank to the tip: the direction of drilling, +z on the path
+};
+
+/// What one cycle removed. `indices` is valid until the next call; ascending order.
+struct Removal {
+  std::uint64_t count = 0;
+  std::uint64_t density_sum_mg_cm3 = 0;  ///< exact, order-independent
+  std::uint64_t hash_delta = 0;          ///< sum of mix64(index) modulo 2^64: order-independent
+  std::uint64_t tested = 0;              ///< points put to the predicate
+  std::span<const std::uint32_t> indices;
+};
+
+/// The removal contract. After step(), every alive point of `volume` that the predicate (predicate.h) puts inside
+/// the bit at `pose` is removed, and no other is touched. (`report` breaks the first half, as published.)
+/// step() does not allocate, lock, throw or call libm; the same inputs give the same bits on every target.
+class Engine {
+ public:
+  virtual ~Engine() = default;
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
+  [[nodiscard]] virtual std::string_view name() const = 0;
+  /// @pre `volume` is the one the engine was made for; pose is finite, its axis a unit vector to 1e-9.
+  virtual Removal step(point_volume::PointVolume& volume, const BitPose& pose) = 0;
+
+ protected:
+  Engine() = default;
+};
+
+/// `reference`: every alive point, every cycle; the truth for all others.
+/// `report`:    the 2002 algorithm as published; the rival in benchmarks.
+/// `bounded`:   as reference, but only on the discs and rings that the bit can reach; what the program uses.
+/// @error NotFound, naming the engines there are.
+[[nodiscard]] Result<std::unique_ptr<Engine>> makeEngine(std::string_view name, const point_volume::PointVolume& volume,
+                                                         const plan::Bit& bit);
+
+[[nodiscard]] std::vector<std::string_view> engineNames();
+
+}  // namespace spinaltap::drill

@@ -1,0 +1,42 @@
+// core/point_volume/point_volume.h - which points of the lattice are bone, and how dense each is.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/base/field.h"
+#include "core/base/frame.h"
+#include "core/point_volume/lattice.h"
+
+namespace spinaltap::point_volume {
+
+/// One alive bit and a density a point; nothing else is stored per point.
+struct PointVolume {
+  Lattice lattice;
+  std::vector<std::uint64_t> alive;           ///< bit (index & 63) of word (index >> 6); bits past the end are 0
+  std::vector<std::uint16_t> density_mg_cm3;  ///< #points; apparent density, 0 where no bone is
+
+  [[nodiscard]] bool isAlive(std::uint32_t index) const { return (alive[index >> 6] >> (index & 63)) & 1u; }
+};
+
+/// Apparent density of bone from HU: 47 + 1.122 HU kg/m3 (= mg/cm3), the lumbar relation of Rho, Hobatho and Ashman,
+/// Med. Eng. Phys. 17 (1995), clamped to 0 .. 65535.
+[[nodiscard]] std::uint16_t densityFromHu(double hu);
+
+/// All points alive, one density: the bare volume of scenes and benchmarks.
+/// @error as checkLattice.
+[[nodiscard]] Result<PointVolume> solidVolume(const Lattice& lattice, std::uint16_t density_mg_cm3);
+
+/// hu(points_patient, out): the CT's HU at each point.
+using HuSampler = std::function<void(std::span<const Vec3>, std::span<double>)>;
+
+/// Points inside the bone (field < 0) are alive with the CT's density. The field is evaluated only where its
+/// Lipschitz bound cannot already decide; the result equals evaluating every point.
+/// @error as checkLattice.
+[[nodiscard]] Result<PointVolume> buildVolume(const Lattice& lattice, const Frame& path_frame, const Field& field,
+                                              const HuSampler& hu);
+
+[[nodiscard]] std::uint64_t countAlive(const PointVolume& volume);
+
+}  // namespace spinaltap::point_volume

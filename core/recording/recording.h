@@ -1,0 +1,78 @@
+// core/recording/recording.h - everything needed to re-run a drill session bit for bit, as bytes.
+// Layout: core/recording/FORMAT.md (normative).
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/result.h"
+#include "core/session/session.h"
+
+namespace spinaltap::recording {
+
+/// What the session started from. The point volume is embedded, so a recording needs nothing else to be replayed.
+struct Header {
+  std::string core_version;
+  std::string case_id, path_id;  ///< empty for scenes
+  std::string scene;             ///< empty for cases
+  session::Config config;
+};
+
+/// The state after a cycle, for comparison.
+struct Checkpoint {
+  std::uint64_t cycle = 0;  ///< 1-based, as session::Output::cycle
+  std::uint64_t state_hash = 0;
+};
+
+struct Recording {
+  Header header;
+  point_volume::PointVolume volume;    ///< as it was before the first input
+  std::vector<session::Input> inputs;  ///< as they arrived, refused ones included
+  std::vector<Checkpoint> checkpoints;
+  bool complete = false;  ///< false when the tail was cut off: everything up to the cut is here
+};
+
+/// Receives bytes in order; returns false when they could not be kept.
+using Sink = std::function<bool(std::span<const std::byte>)>;
+
+/// Append-only; each chunk carries its own checksum, so a cut loses at most the last chunk.
+class Writer {
+ public:
+  /// @error Io, when the sink refuses the header.
+  [[nodiscard]] static Result<Writer> begin(const Header& header, const point_volume::PointVolume& volume, Sink sink);
+  Writer(Writer&&) noexcept;
+  Writer& operator=(Writer&&) noexcept;
+  ~Writer();
+
+  /// Buffers; writes a chunk every 1000 inputs. @error Io.
+  [[nodiscard]] Result<void> append(const session::Input& input, const session::Output& output);
+  /// Writes what is buffered, so that it survives a crash. @error Io.
+  [[nodiscard]] Result<void> flush();
+  /// The last chunk and the end mark. @error Io.
+  [[nodiscard]] Result<void> finish();
+
+ private:
+  struct State;
+  explicit Writer(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// @error Corrupt (naming the offset), Unsupported (a newer version), Limit. A cut tail is no error: complete = false.
+[[nodiscard]] Result<Recording> read(std::span<const std::byte> bytes);
+
+struct ReplayReport {
+  bool verified = false;  ///< every checkpoint met, and at least one
+  std::uint64_t cycles = 0;
+  std::uint64_t state_hash = 0;        ///< after the last input
+  std::uint64_t first_difference = 0;  ///< cycle of the first checkpoint that differs; 0 when none does
+};
+
+/// Runs the inputs through a fresh session. progress(fraction) may be empty.
+/// @error as session::Session::create.
+[[nodiscard]] Result<ReplayReport> replay(const Recording& recording, const std::function<void(double)>& progress = {});
+
+}  // namespace spinaltap::recording

@@ -1,0 +1,71 @@
+// core/session/session.h - one trainee, one point volume, one bit, live. step() is the only live-loop entry.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/drill/engine.h"
+#include "core/haptics/thrust.h"
+#include "core/plan/path.h"
+#include "core/point_volume/point_volume.h"
+
+namespace spinaltap::session {
+
+/// One pose as it arrived. Any bits are allowed: step() refuses what is not a pose.
+struct Input {
+  std::uint64_t t_us = 0;  ///< the client's clock; must not fall
+  Vec3 tip_mm;             ///< path frame
+  Vec3 axis{0, 0, 1};      ///< path frame, shank to tip; normalised by step()
+  bool spinning = true;    ///< a bit that does not turn removes nothing
+  friend bool operator==(const Input&, const Input&) = default;
+};
+
+enum class Status : std::uint8_t {
+  Ok = 0,
+  RefusedNotFinite = 1,  ///< a component is NaN or infinite, or beyond 1e6 mm
+  RefusedAxis = 2,       ///< the axis has no direction (length below 1e-6 or above 1e6)
+  RefusedTime = 3,       ///< t_us fell
+};
+
+/// A refused input leaves the state untouched, gives zero thrust, and is not counted as a cycle.
+struct Output {
+  Status status = Status::Ok;
+  std::uint64_t cycle = 0;    ///< accepted inputs so far, this one included
+  std::uint64_t removed = 0;  ///< points removed by this cycle
+  std::uint64_t removed_total = 0;
+  double thrust_N = 0;
+  double depth_mm = 0;           ///< of the tip past the entry point along the path; negative before it
+  std::uint64_t state_hash = 0;  ///< of the removed set, the accumulated density, the force and the cycle count
+  std::span<const std::uint32_t> removed_indices;  ///< valid until the next step
+};
+
+struct Config {
+  plan::Bit bit;
+  std::string engine = "bounded";
+};
+
+class Session {
+ public:
+  /// @error as drill::makeEngine and plan::checkBit.
+  [[nodiscard]] static Result<Session> create(point_volume::PointVolume volume, const Config& config);
+
+  /// Fixed and total: any input gives a defined output. Does not allocate, lock, throw, log or read a clock.
+  [[nodiscard]] Output step(const Input& input) noexcept;
+
+  [[nodiscard]] const point_volume::PointVolume& volume() const { return volume_; }
+  [[nodiscard]] const Config& config() const { return config_; }
+  [[nodiscard]] std::uint64_t stateHash() const;
+
+ private:
+  Session(point_volume::PointVolume volume, Config config, std::unique_ptr<drill::Engine> engine);
+
+  point_volume::PointVolume volume_;
+  Config config_;
+  std::unique_ptr<drill::Engine> engine_;
+  haptics::Thrust thrust_;
+  std::uint64_t cycle_ = 0, last_t_us_ = 0;
+  std::uint64_t removed_total_ = 0, density_total_ = 0, removed_hash_ = 0;
+};
+
+}  // namespace spinaltap::session

@@ -1,0 +1,114 @@
+// core/wire/bytes.h - little-endian fields, one by one; a struct's bytes never leave the process.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/vec3.h"
+
+namespace spinaltap::wire {
+
+class ByteWriter {
+ public:
+  void u8(std::uint8_t v) { bytes_.push_back(static_cast<std::byte>(v)); }
+  void u16(std::uint16_t v) { integer(v); }
+  void u32(std::uint32_t v) { integer(v); }
+  void u64(std::uint64_t v) { integer(v); }
+  void i32(std::int32_t v) { integer(static_cast<std::uint32_t>(v)); }
+  void f32(float v) {
+    std::uint32_t b = 0;
+    std::memcpy(&b, &v, sizeof b);
+    u32(b);
+  }
+  void f64(double v) {
+    std::uint64_t b = 0;
+    std::memcpy(&b, &v, sizeof b);
+    u64(b);
+  }
+  void vec3(const Vec3& v) { f64(v.x), f64(v.y), f64(v.z); }
+  /// Length as u32, then the bytes.
+  void text(std::string_view v) {
+    u32(static_cast<std::uint32_t>(v.size()));
+    for (const char c : v) u8(static_cast<std::uint8_t>(c));
+  }
+  void raw(std::span<const std::byte> v) { bytes_.insert(bytes_.end(), v.begin(), v.end()); }
+
+  [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
+  [[nodiscard]] std::vector<std::byte> take() { return std::move(bytes_); }
+  void clear() { bytes_.clear(); }
+
+ private:
+  template <class T>
+  void integer(T v) {
+    for (unsigned shift = 0; shift < 8 * sizeof(T); shift += 8) u8(static_cast<std::uint8_t>(v >> shift));
+  }
+  std::vector<std::byte> bytes_;
+};
+
+/// Reads past the end give zeros and set failed(); check it once, at the end or before a length is trusted.
+class ByteReader {
+ public:
+  explicit ByteReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+
+  std::uint8_t u8() {
+    if (at_ >= bytes_.size()) {
+      failed_ = true;
+      return 0;
+    }
+    return static_cast<std::uint8_t>(bytes_[at_++]);
+  }
+  std::uint16_t u16() { return integer<std::uint16_t>(); }
+  std::uint32_t u32() { return integer<std::uint32_t>(); }
+  std::uint64_t u64() { return integer<std::uint64_t>(); }
+  std::int32_t i32() { return static_cast<std::int32_t>(u32()); }
+  float f32() {
+    const std::uint32_t b = u32();
+    float v = 0;
+    std::memcpy(&v, &b, sizeof v);
+    return v;
+  }
+  double f64() {
+    const std::uint64_t b = u64();
+    double v = 0;
+    std::memcpy(&v, &b, sizeof v);
+    return v;
+  }
+  Vec3 vec3() {
+    const double x = f64(), y = f64(), z = f64();
+    return {x, y, z};
+  }
+  /// Fails when the length exceeds `limit` or what is left.
+  std::string text(std::size_t limit = 4096) {
+    const std::span<const std::byte> v = raw(u32(), limit);
+    return {reinterpret_cast<const char*>(v.data()), v.size()};
+  }
+  std::span<const std::byte> raw(std::size_t size, std::size_t limit = SIZE_MAX) {
+    if (failed_ || size > limit || size > left()) {
+      failed_ = true;
+      return {};
+    }
+    at_ += size;
+    return bytes_.subspan(at_ - size, size);
+  }
+
+  [[nodiscard]] bool failed() const { return failed_; }
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+  [[nodiscard]] std::size_t offset() const { return at_; }
+
+ private:
+  template <class T>
+  T integer() {
+    T v = 0;
+    for (unsigned shift = 0; shift < 8 * sizeof(T); shift += 8) v = static_cast<T>(v | (static_cast<T>(u8()) << shift));
+    return v;
+  }
+  std::span<const std::byte> bytes_;
+  std::size_t at_ = 0;
+  bool failed_ = false;
+};
+
+}  // namespace spinaltap::wire
