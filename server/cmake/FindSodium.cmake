@@ -1,0 +1,10 @@
+# libsodium has no CMake config of its own: spinaltap::sodium.
+find_path(SODIUM_INCLUDE_DIR sodium.h)
+find_library(SODIUM_LIBRARY sodium)
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(Sodium REQUIRED_VARS SODIUM_INCLUDE_DIR SODIUM_LIBRARY)
+if(Sodium_FOUND AND NOT TARGET spinaltap::sodium)
+  add_library(spinaltap::sodium INTERFACE IMPORTED)
+  target_include_directories(spinaltap::sodium SYSTEM INTERFACE ${SODIUM_INCLUDE_DIR})
+  target_link_libraries(spinaltap::sodium INTERFACE ${SODIUM_LIBRARY})
+endif()

@@ -1,0 +1,214 @@
+#include "server/store/store.h"
+
+#include <gtest/gtest.h>
+// before any sqlite3.h
+#include <soci/soci.h>
+#include <soci/sqlite3/soci-sqlite3.h>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <limits>
+#include <set>
+#include <thread>
+
+#include "server/store/ids.h"
+#include "tests/server/temporary_folder.h"
+
+namespace spinaltap::store {
+namespace {
+
+Case exampleCase() {
+  Case wanted;
+  wanted.label = "Phantom L3 \xc3\xa9'\"; DROP TABLE cases; --";
+  wanted.grid.dims = {512, 511, 95};
+  // numbers that a sloppy round trip through text would change
+  wanted.grid.spacing_mm = {0.1 + 0.2, 1.0 / 3.0, 0.5};
+  wanted.grid.origin_patient = {-1e6 / 7, std::numeric_limits<double>::denorm_min(), 1e300};
+  wanted.grid.direction = {{0.6, 0.8, 0}, {-0.8, 0.6, 0}, {0, 0, 1}};
+  wanted.ct = std::string(64, 'a');
+  return wanted;
+}
+
+Path examplePath(const std::string& case_id) {
+  Path wanted;
+  wanted.case_id = case_id;
+  wanted.label = "left pedicle";
+  wanted.path.entry_patient = {-1.0 / 3.0, 2, 3};
+  wanted.path.target_patient = {4, 5, 6.1};
+  wanted.path.lead_mm = 2.5;
+  wanted.lattice = {0.1, 40, 400, -25};
+  wanted.points_alive = 1'234'567;
+  wanted.point_volume = std::string(64, 'b');
+  return wanted;
+}
+
+TEST(Store, GivesBackACaseExactlyAsItWasKept) {
+  const test::TemporaryFolder folder;
+  std::string id;
+  {
+    auto store = Store::open(folder.path()).value();
+    id = store.addCase(exampleCase()).value().id;
+  }
+  auto store = Store::open(folder.path()).value();  // a second start
+  const Case found = store.findCase(id).value();
+  EXPECT_EQ(found.label, exampleCase().label);
+  EXPECT_EQ(found.grid, exampleCase().grid);
+  EXPECT_EQ(found.ct, exampleCase().ct);
+  EXPECT_EQ(found.stage, Stage::Imported);
+  EXPECT_EQ(found.created.size(), 20u);
+  EXPECT_TRUE(isId(id));
+}
+
+TEST(Store, GivesBackAPathAndARecordingExactlyAsTheyWereKept) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const Case in = store.addCase(exampleCase()).value();
+  const Path path = store.addPath(examplePath(in.id)).value();
+  const Path found = store.findPath(in.id, path.id).value();
+  EXPECT_EQ(found.path.entry_patient, path.path.entry_patient);
+  EXPECT_EQ(found.path.target_patient, path.path.target_patient);
+  EXPECT_EQ(found.path.bit, path.path.bit);
+  EXPECT_EQ(found.path.lead_mm, 2.5);
+  EXPECT_EQ(found.lattice, path.lattice);
+  EXPECT_EQ(found.points_alive, 1'234'567u);
+  Recording wanted{"", in.id, path.id, "", (1ull << 40) + 1, true, "{\"a\":1}", std::string(64, 'c')};
+  const Recording kept = store.addRecording(wanted).value();
+  const Recording back = store.findRecording(kept.id).value();
+  EXPECT_EQ(back.cycles, wanted.cycles);
+  EXPECT_TRUE(back.complete);
+  EXPECT_EQ(back.metrics_json, wanted.metrics_json);
+  EXPECT_EQ(store.findCase(in.id).value().paths, 1);
+  EXPECT_EQ(store.findCase(in.id).value().recordings, 1);
+}
+
+TEST(Store, MovesACaseThroughItsStages) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string id = store.addCase(exampleCase()).value().id;
+  ASSERT_TRUE(store.setLabel(id, std::string(64, 'd'), "segmented").has_value());
+  EXPECT_EQ(store.findCase(id).value().stage, Stage::Segmented);
+  const Reconstruction made{std::string(64, '1'), std::string(64, '2'), std::string(64, '3'), "{\"fit_s\":1.5}"};
+  ASSERT_TRUE(store.setReconstruction(id, made).has_value());
+  const Case found = store.findCase(id).value();
+  EXPECT_EQ(found.stage, Stage::Reconstructed);
+  EXPECT_EQ(found.mesh, made.mesh);
+  EXPECT_EQ(found.figures_json, made.figures_json);
+}
+
+TEST(Store, ListsNewestCasesFirst) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string first = store.addCase(exampleCase()).value().id, second = store.addCase(exampleCase()).value().id;
+  const auto cases = store.cases().value();
+  ASSERT_EQ(cases.size(), 2u);
+  EXPECT_EQ(cases[0].id, second);
+  EXPECT_EQ(cases[1].id, first);
+}
+
+TEST(Store, NamesWhatIsNotThere) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string id = store.addCase(exampleCase()).value().id;
+  EXPECT_EQ(store.findCase("czzzzzzz").error().message, "there is no case czzzzzzz");
+  EXPECT_EQ(store.findCase("x' OR '1'='1").error().message, "there is no case (not an id)");
+  EXPECT_EQ(store.findPath(id, "pzzz").error().code, ErrorCode::NotFound);
+  EXPECT_EQ(store.findRecording("").error().code, ErrorCode::NotFound);
+  EXPECT_EQ(store.setLabel("czzz", "", "segmented").error().code, ErrorCode::NotFound);
+  EXPECT_EQ(store.setReconstruction("czzz", {}).error().code, ErrorCode::NotFound);
+  EXPECT_EQ(store.addPath(examplePath("czzz")).error().code, ErrorCode::NotFound);
+  EXPECT_EQ(store.addRecording({"", id, "pzzz", "", 0, false, "{}", ""}).error().code, ErrorCode::NotFound);
+}
+
+TEST(Store, DoesNotServeAPathUnderAnotherCase) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string a = store.addCase(exampleCase()).value().id, b = store.addCase(exampleCase()).value().id;
+  const std::string path = store.addPath(examplePath(a)).value().id;
+  EXPECT_EQ(store.findPath(b, path).error().code, ErrorCode::NotFound);
+}
+
+TEST(Store, SeveralProcessesWriteTogether) {
+  const test::TemporaryFolder folder;
+  constexpr int kProcesses = 4, kCases = 12;
+  std::vector<pid_t> children;
+  for (int p = 0; p < kProcesses; ++p) {
+    const pid_t child = ::fork();  // also races them through the first migration
+    if (child == 0) {
+      auto store = Store::open(folder.path());
+      bool ok = store.has_value();
+      for (int i = 0; ok && i < kCases; ++i) ok = store->addCase(exampleCase()).has_value();
+      ::_exit(ok ? 0 : 1);
+    }
+    children.push_back(child);
+  }
+  for (const pid_t child : children) {
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0);
+  }
+  std::set<std::string> ids;
+  auto store = Store::open(folder.path()).value();
+  const auto cases = store.cases().value();
+  for (const Case& row : cases) ids.insert(row.id);
+  EXPECT_EQ(ids.size(), static_cast<std::size_t>(kProcesses * kCases));
+}
+
+TEST(Store, SeveralThreadsShareOneStore) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string id = store.addCase(exampleCase()).value().id;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&] {
+      for (int i = 0; i < 10; ++i) {
+        EXPECT_TRUE(store.addPath(examplePath(id)).has_value());
+        EXPECT_TRUE(store.findCase(id).has_value());
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(store.paths(id).value().size(), 40u);
+}
+
+TEST(Store, RefusesAFolderMadeByANewerProgram) {
+  const test::TemporaryFolder folder;
+  ASSERT_TRUE(Store::open(folder.path()).has_value());
+  {
+    soci::session sql(soci::sqlite3, "dbname=\"" + (folder.path() / "spinaltap.db").string() + "\"");
+    sql << "UPDATE schema_version SET version = 99";
+  }
+  const auto refused = Store::open(folder.path());
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(refused.error().message,
+            "data folder: made by a newer version of spinaltap (schema 99, this program knows 1)");
+}
+
+TEST(Store, RefusesWhatIsNotADataBase) {
+  const test::TemporaryFolder folder;
+  ASSERT_TRUE(replaceFile(folder.path() / "spinaltap.db", std::vector<std::byte>(5000, std::byte{'x'})).has_value());
+  EXPECT_EQ(Store::open(folder.path()).error().code, ErrorCode::Io);
+}
+
+TEST(Store, RefusesAFolderThatCannotBe) { EXPECT_EQ(Store::open("/proc/nothing/here").error().code, ErrorCode::Io); }
+
+TEST(Ids, AreUnlikeEachOtherAndKeepOutOfPaths) {
+  std::set<std::string> seen;
+  for (int i = 0; i < 1000; ++i) seen.insert(randomId('c'));
+  EXPECT_EQ(seen.size(), 1000u);  // of 32^7: a repeat has a chance of 1.5e-5
+  for (const char* bad : {"", "c", "../x", "c7k2m9x/", "C7K2M9XQ", "c7k2m9xi"}) EXPECT_FALSE(isId(bad)) << bad;
+}
+
+TEST(DataFolder, IsTheOptionThenTheVariableThenHome) {
+  ::setenv("HOME", "/home/someone", 1);
+  ::unsetenv("SPINALTAP_DATA");
+  EXPECT_EQ(dataFolder("").value(), "/home/someone/.local/share/spinaltap");
+  ::setenv("SPINALTAP_DATA", "/data", 1);
+  EXPECT_EQ(dataFolder("").value(), "/data");
+  EXPECT_EQ(dataFolder("here").value(), "here");
+}
+
+}  // namespace
+}  // namespace spinaltap::store
