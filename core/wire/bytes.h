@@ -1,5 +1,6 @@
 // core/wire/bytes.h - little-endian fields, one by one; a struct's bytes never leave the process.
 #pragma once
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -11,6 +12,18 @@
 #include "core/base/vec3.h"
 
 namespace spinaltap::wire {
+
+/// Copies numbers between memory and little-endian bytes, all at once where the machine's own order is the wire's.
+template <class T>
+void copyLittleEndian(std::byte* to, const std::byte* from, std::size_t count) {
+  if constexpr (std::endian::native == std::endian::little) {
+    if (count > 0) std::memcpy(to, from, count * sizeof(T));
+  } else {
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t b = 0; b < sizeof(T); ++b) to[i * sizeof(T) + b] = from[(i + 1) * sizeof(T) - 1 - b];
+    }
+  }
+}
 
 class ByteWriter {
  public:
@@ -35,6 +48,14 @@ class ByteWriter {
     u32(static_cast<std::uint32_t>(v.size()));
     for (const char c : v) u8(static_cast<std::uint8_t>(c));
   }
+  /// Numbers in order, without a count.
+  template <class T>
+  void array(std::span<const T> v) {
+    const std::size_t at = bytes_.size();
+    bytes_.resize(at + v.size_bytes());
+    copyLittleEndian<T>(bytes_.data() + at, reinterpret_cast<const std::byte*>(v.data()), v.size());
+  }
+  void reserve(std::size_t size) { bytes_.reserve(size); }
   void raw(std::span<const std::byte> v) { bytes_.insert(bytes_.end(), v.begin(), v.end()); }
 
   [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
@@ -93,6 +114,19 @@ class ByteReader {
     }
     at_ += size;
     return bytes_.subspan(at_ - size, size);
+  }
+
+  /// `count` numbers; fails, without allocating, when that many are not left.
+  template <class T>
+  std::vector<T> array(std::uint64_t count) {
+    if (failed_ || count > left() / sizeof(T)) {
+      failed_ = true;
+      return {};
+    }
+    const std::span<const std::byte> from = raw(static_cast<std::size_t>(count) * sizeof(T));
+    std::vector<T> v(static_cast<std::size_t>(count));
+    copyLittleEndian<T>(reinterpret_cast<std::byte*>(v.data()), from.data(), v.size());
+    return v;
   }
 
   [[nodiscard]] bool failed() const { return failed_; }
