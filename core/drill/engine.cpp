@@ -1,0 +1,20 @@
+#include "core/drill/engine.h"
+
+#include <string>
+
+#include "core/drill/cutter.h"
+
+namespace spinaltap::drill {
+
+Result<std::unique_ptr<Engine>> makeEngine(std::string_view name, const point_volume::PointVolume& volume,
+                                           const plan::Bit& bit) {
+  if (name == "reference") return makeReference(volume.lattice, bit);
+  if (name == "report") return makeReport(volume.lattice, bit);
+  if (name == "bounded") return makeBounded(volume.lattice, bit);
+  return fail(ErrorCode::NotFound,
+              "no engine '" + std::string(name.substr(0, 40)) + "': there are reference, report and bounded");
+}
+
+std::vector<std::string_view> engineNames() { return {"reference", "report", "bounded"}; }
+
+}  // namespace spinaltap::drill
