@@ -49,9 +49,11 @@ struct Fit {
 /// progress(fraction 0..1); may be empty.
 using Progress = std::function<void(double)>;
 
-/// Greedy centres, dense direct solve.
+/// Greedy centres, dense direct solve. Samples within 1e-6 of the box's diagonal of each other count as one, with their
+/// mean value. With smoothing, a centre's value is drawn towards the mean of the samples around it, so noise averages
+/// out; without, every centre's own sample is met exactly.
 /// @pre    at least 4 samples, not all in one plane, finite.
-/// @error  Degenerate, NotFinite, InvalidArgument.
+/// @error  Degenerate, NotFinite, InvalidArgument, Limit (over 20,000 centres).
 /// @cost   O(max_centres^3 + max_centres * #S).
 [[nodiscard]] Result<Fit> fit(const Samples& samples, const FitOptions& options, const Progress& progress = {});
 
