@@ -42,13 +42,13 @@ using Sink = std::function<bool(std::span<const std::byte>)>;
 /// Append-only; each chunk carries its own checksum, so a cut loses at most the last chunk.
 class Writer {
  public:
-  /// @error Io, when the sink refuses the header.
+  /// @error Io, when the sink refuses the header; Limit, over 2^26 points or 4096 bytes a text.
   [[nodiscard]] static Result<Writer> begin(const Header& header, const point_volume::PointVolume& volume, Sink sink);
   Writer(Writer&&) noexcept;
   Writer& operator=(Writer&&) noexcept;
   ~Writer();
 
-  /// Buffers; writes a chunk every 1000 inputs. @error Io.
+  /// Buffers; writes a chunk every 1000 inputs. @error Io; from then on nothing more is written, and every call fails.
   [[nodiscard]] Result<void> append(const session::Input& input, const session::Output& output);
   /// Writes what is buffered, so that it survives a crash. @error Io.
   [[nodiscard]] Result<void> flush();
@@ -61,7 +61,9 @@ class Writer {
   std::unique_ptr<State> state_;
 };
 
-/// @error Corrupt (naming the offset), Unsupported (a newer version), Limit. A cut tail is no error: complete = false.
+/// @error Corrupt (naming the offset), Unsupported (another version), Limit. A cut tail is no error: complete = false,
+/// with
+///        everything before the cut; but when not even the point volume is whole there is nothing to replay: Corrupt.
 [[nodiscard]] Result<Recording> read(std::span<const std::byte> bytes);
 
 struct ReplayReport {
