@@ -24,7 +24,7 @@ struct Splat {
 /// The farthest any place inside the lattice can be from its nearest point, as a multiple of the spacing: discs of this
 /// radius around the exposed points leave no gap at any tilt. A cubic lattice needs sqrt(3)/2 = 0.866; here slots of a
 /// ring are up to pi/3 apart instead of 1, so sqrt((pi/3)^2 + 1 + 1)/2 = 0.880.
-inline constexpr double kCoveringRadiusPerSpacing = 0.8799;
+inline constexpr double kCoveringRadiusPerSpacing = 0.88;
 
 /// The eight neighbours of a point: two on its ring, six in all on its disc (the rings of a disc have the topology of a
 /// triangular lattice: 6 around the centre; 2 in, 2 along, 2 out; at the six corners 1 in, 2 along, 3 out), and the
@@ -92,7 +92,7 @@ class SplatTracker {
   Neighbours neighbours_;
   point_volume::Lattice lattice_;
   point_volume::DiscTable disc_;
-  std::vector<std::uint64_t> queued_;  ///< exposed: waiting or drawn
+  std::vector<std::uint64_t> queued_;  ///< seen before: waiting or drawn
   std::vector<std::uint64_t> drawn_;   ///< taken by the client
   std::vector<Splat> waiting_;
   std::vector<std::uint32_t> hidden_;
