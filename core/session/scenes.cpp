@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "core/base/dmath.h"
 
@@ -70,6 +71,21 @@ Result<point_volume::PointVolume> sceneVolume(int discs) {
   point_volume::Lattice lattice = reportLattice();
   lattice.discs = discs;
   return point_volume::solidVolume(lattice, kSceneDensity_mg_cm3);
+}
+
+Result<SceneResult> runScene(Scene scene, std::string_view engine, std::uint64_t cycles, int discs) {
+  if (cycles > kMostSceneCycles) return fail(ErrorCode::Limit, "scene: more than 5,000,000 cycles");
+  auto volume = sceneVolume(discs);
+  if (!volume) return tl::unexpected(volume.error());
+  auto session = Session::create(std::move(*volume), {reportBit(), std::string(engine)});
+  if (!session) return tl::unexpected(session.error());
+  SceneResult result;
+  result.state_hash = session->stateHash();
+  for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
+    const Output output = session->step(sceneInput(scene, cycle));
+    result = {output.state_hash, output.removed_total, output.cycle};
+  }
+  return result;
 }
 
 }  // namespace spinaltap::session

@@ -43,4 +43,14 @@ inline constexpr std::uint16_t kSceneDensity_mg_cm3 = 300;
 /// @error as point_volume::checkLattice.
 [[nodiscard]] Result<point_volume::PointVolume> sceneVolume(int discs = 378);
 
+struct SceneResult {
+  std::uint64_t state_hash = 0;
+  std::uint64_t removed = 0;
+  std::uint64_t cycles = 0;
+};
+
+/// Runs cycles 0 .. cycles-1 of a scene on sceneVolume(discs) with reportBit().
+/// @error as sceneVolume and Session::create; Limit, above kMostSceneCycles.
+[[nodiscard]] Result<SceneResult> runScene(Scene scene, std::string_view engine, std::uint64_t cycles, int discs = 378);
+
 }  // namespace spinaltap::session

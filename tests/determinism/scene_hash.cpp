@@ -1,0 +1,30 @@
+// One line per scene run: "on bounded 378 500 <state hash> <points removed>". No test library, so that any compiler at
+// any level can build it in seconds.
+//
+//   scene_hash SCENE ENGINE DISCS CYCLES [SCENE ENGINE DISCS CYCLES ...]
+#include <cstdio>
+#include <cstdlib>
+
+#include "core/session/scenes.h"
+
+int main(int argc, char** argv) {
+  using namespace spinaltap;
+  if (argc < 5 || (argc - 1) % 4 != 0) {
+    std::fprintf(stderr, "usage: scene_hash SCENE ENGINE DISCS CYCLES ...\n");
+    return 2;
+  }
+  for (int i = 1; i < argc; i += 4) {
+    const auto scene = session::sceneNamed(argv[i]);
+    const auto result =
+        scene ? session::runScene(*scene, argv[i + 1], std::strtoull(argv[i + 3], nullptr, 10), std::atoi(argv[i + 2]))
+              : tl::unexpected(scene.error());
+    if (!result) {
+      std::fprintf(stderr, "scene_hash: %s\n", result.error().message.c_str());
+      return 1;
+    }
+    std::printf("%s %s %s %s %016llx %llu\n", argv[i], argv[i + 1], argv[i + 2], argv[i + 3],
+                static_cast<unsigned long long>(result->state_hash), static_cast<unsigned long long>(result->removed));
+    std::fflush(stdout);
+  }
+  return 0;
+}
