@@ -14,10 +14,15 @@ double square(double x) { return x * x; }
 /// Distance from the midline, rounded off within a millimetre so that mirrored parts meet without a crease.
 double fromMidline(double x) { return std::sqrt(x * x + 0.6); }
 
-/// Two unit vectors of a plate's plane: `along` as given, `up` made orthogonal to it.
-Plate plate(const Vec3& centre, const Vec3& along, const Vec3& up, double half_length, double half_width) {
+/// Half sizes of a plate: along, across, and the radius of its corners.
+struct Half {
+  double length, width, corner;
+};
+
+/// A plate whose second axis is `across` made orthogonal to the first.
+Plate plate(const Vec3& centre, const Vec3& along, const Vec3& across, const Half& half) {
   const Vec3 a = normalized(along);
-  return {centre, a, normalized(up - a * dot(a, up)), half_length, half_width};
+  return {centre, a, normalized(across - a * dot(a, across)), half.length, half.width, half.corner};
 }
 
 /// Slow bending of space, under half a millimetre: bones are not mirror images.
@@ -34,22 +39,23 @@ struct Section {
 };
 
 Section section(const Anatomy& an, const Vec3& p) {
-  // Waisted: the width grows towards the rims, most of it in the last few millimetres.
+  // Waisted: the width grows towards the rims.
   const double t = std::min(square(p.z / an.half_height), 1.3);
-  const double flare = 0.45 * t + 0.55 * t * t * t;
+  const double flare = 0.6 * t + 0.4 * t * t;
   const double a = an.waist_half_width + (an.rim_half_width - an.waist_half_width) * std::min(flare, 1.15);
   const double b = an.waist_half_depth + (an.rim_half_depth - an.waist_half_depth) * std::min(flare, 1.15);
   // Bent backwards like a kidney: the back wall turns concave, the front stays round.
   const double u = p.x / a;
-  const double v = (p.y - an.kidney * p.x * p.x + 0.9) / b;
+  const double flat = 1.0 / (1.0 + p.x * p.x / 2500.0);  // far to the side the bend would only steepen the field
+  const double v = (p.y - an.kidney * (p.x * p.x * flat - 130.0)) / b;
   // Between an ellipse (2) and a squarer oval (0); squarer at the back.
-  const double c = 1.15 - 0.75 * v / std::sqrt(1.0 + v * v);
+  const double c = 0.95 - 0.35 * v / std::sqrt(1.0 + v * v);
   const double u2 = u * u, v2 = v * v;
   const double n4 = u2 * u2 + c * u2 * v2 + v2 * v2;
   const double n = std::sqrt(std::sqrt(n4 + 1e-12));
   const double n3 = n * n * n;
   const double gu = u * (u2 + 0.5 * c * v2) / n3, gv = v * (v2 + 0.5 * c * u2) / n3;
-  const double gx = gu / a - gv * 2.0 * an.kidney * p.x / b, gy = gv / b;
+  const double gx = gu / a - gv * 2.0 * an.kidney * p.x * flat * flat / b, gy = gv / b;
   const double g = std::sqrt(gx * gx + gy * gy);
   const double trust = smoothStep(0.1, 0.9, n);  // the gradient has no limit in the middle
   return {n, b + (1.0 / std::max(g, 1e-3) - b) * trust};
@@ -58,12 +64,13 @@ Section section(const Anatomy& an, const Vec3& p) {
 double bodyOf(const Anatomy& an, const Vec3& p) {
   const Section s = section(an, p);
   const double side = (s.value - 1.0) * s.scale;
-  const double dish = an.endplate_dish * square(std::max(1.0 - 1.15 * square(s.value), 0.0));
+  // The endplate: a flat ring under the rim, and a dish inside it.
+  const double dish = an.endplate_dish * square(std::max(1.0 - 1.3 * square(s.value), 0.0));
   const double height = an.half_height - an.wedge * p.y;
   const double ends = std::fabs(p.z) - height + dish;
   // The basivertebral vein's opening in the middle of the back wall.
-  const double vein = norm(Vec3{p.x / 1.6, p.y - (an.waist_half_depth + 0.3), p.z}) - 1.6;
-  return smoothMax(smoothMax(side, ends, 2.2), -vein, 2.0);
+  const double vein = norm(Vec3{p.x / 1.7, p.y - (an.waist_half_depth - 0.6), p.z}) - 1.5;
+  return smoothMax(smoothMax(side, ends, 3.0), -vein, 2.0);
 }
 
 double canalOf(const Anatomy& an, const Vec3& p) {
@@ -76,64 +83,97 @@ double canalOf(const Anatomy& an, const Vec3& p) {
 
 /// `m` is the point mirrored to the left side.
 double pedicleOf(const Anatomy& an, const Vec3& m) {
-  const Plate blank =
-      plate(pedicleIsthmus(an, 1), pedicleAxis(an, 1), {0, 0, 1}, 10.0, an.pedicle_half_height - an.pedicle_half_width);
+  const double flat = an.pedicle_half_height - an.pedicle_half_width;
+  const Plate blank = plate(pedicleIsthmus(an, 1), pedicleAxis(an, 1), {0, 0, 1}, {10.0, flat, 0.0});
   const Plate::Local at = blank.nearest(m);
   return at.distance - (an.pedicle_half_width + 0.014 * at.along * at.along);
 }
 
+/// Lamina and the neck (pars) between the articular processes: one sheet, sloping back as it goes down.
 double laminaOf(const Anatomy& an, const Vec3& m) {
   const double y = an.canal_apex_y;
-  const Plate blank = plate({8.0, y - 2.6, -8.0}, {-0.81, 0.59, 0}, {0, 0.22, -1}, 8.5, 6.8);
-  return blank.nearest(m).distance - 2.9;
+  const Plate sheet = plate({7.6, y - 2.0, -9.0}, {-0.82, 0.57, 0}, {0.05, 0.24, -1}, {8.8, 8.0, 3.0});
+  const double neck = capsule(m, {16.6, y - 6.0, 3.0}, {13.0, y + 0.5, -12.0}, 4.2, 3.6);
+  return smoothMin(sheet.nearest(m).distance - 2.7, neck, 4.0);
 }
 
 double spinousOf(const Anatomy& an, const Vec3& p) {
-  const double front = an.canal_apex_y + 4.0, middle = 0.5 * (front + an.spinous_tip_y - 3.5);
-  const Plate blank = plate({0, middle, -11.5}, {0, 1, -0.13}, {0, 0, 1}, an.spinous_tip_y - 3.5 - middle, 6.6);
-  const Plate::Local at = blank.nearest(p, 0.11);
-  const double tip = smoothStep(0.1, 1.0, at.along / blank.half_length);
-  const double low = smoothStep(-0.2, -1.0, at.across / 7.0);
-  return at.distance - (2.9 + 1.1 * tip + 0.8 * low);
+  const double front = an.canal_apex_y + 2.0, back = an.spinous_tip_y - 3.8;
+  const Plate hatchet =
+      plate({0, 0.5 * (front + back), -11.2}, {0, 1, -0.12}, {0, 0, 1}, {0.5 * (back - front), 6.7, 4.5});
+  const Plate::Local at = hatchet.nearest(p, 0.13);
+  const double tip = smoothStep(0.2, 1.0, at.along / hatchet.half_length);
+  const double root = smoothStep(-0.5, -1.0, at.along / hatchet.half_length);
+  const double low = smoothStep(-1.0, -7.0, at.across);
+  return at.distance - (2.5 + 1.2 * tip + 0.9 * root + 0.9 * low);
 }
 
 double transverseOf(const Anatomy& an, const Vec3& m) {
-  const double reach = an.transverse_span - 2.3;
-  const Vec3 root{19.0, an.canal_apex_y - 6.5, 2.5}, tip{reach, an.canal_apex_y - 0.5, 5.5};
-  const Vec3 along = tip - root;
-  const double half = 0.5 * norm(along);
-  const Plate blank = plate((root + tip) * 0.5, along, {0, 0, 1}, half, 2.9);
-  const Plate::Local at = blank.nearest(m, -0.07);
-  return at.distance - (2.5 - 0.025 * at.along);
+  const double y = an.canal_apex_y;
+  const Vec3 root{17.5, y - 7.5, 2.6}, bend{29.0, y - 3.6, 3.6}, tip{an.transverse_span - 2.2, y + 4.0, 5.2};
+  const double half_inner = 0.5 * norm(bend - root), half_outer = 0.5 * norm(tip - bend);
+  const Plate inner = plate((root + bend) * 0.5, bend - root, {0, 0, 1}, {half_inner, 3.6, 2.2});
+  const Plate outer = plate((bend + tip) * 0.5, tip - bend, {0, 0, 1}, {half_outer, 2.6, 2.0});
+  const Plate::Local a = inner.nearest(m, -0.10), b = outer.nearest(m, -0.05);
+  return smoothMin(a.distance - (2.6 - 0.05 * a.along), b.distance - (2.15 - 0.008 * b.along), 3.0);
 }
 
+/// A blade that stands beside the canal, bulging to the back into the mammillary process; its hollow side is the facet.
 double superiorArticularOf(const Anatomy& an, const Vec3& m) {
   const double k = an.articular_scale, y = an.canal_apex_y;
-  const Plate blank = plate({17.6, y - 2.6, 9.0}, {0, 0.05, 1}, {0.66, 0.75, 0}, 6.0 * k, 3.9 * k);
-  double s = blank.nearest(m).distance - 3.4;
-  s = smoothMin(s, norm(m - Vec3{20.8, y + 2.4, 8.5}) - 2.9, 4.0);  // mammillary process
-  // The facet: a hollow that faces back and towards the midline.
-  const double hollow = std::sqrt(square(m.x - 8.6) + square(m.y - (y + 6.2))) - 10.3;
-  return smoothMax(s, -hollow, 1.5);
+  const Plate blade = plate({18.2, y - 2.2, 8.9}, {-0.06, 0.0, 1}, {0.50, 0.866, 0}, {6.0 * k, 5.0 * k, 4.5 * k});
+  double s = blade.nearest(m).distance - 2.6;
+  s = smoothMin(s, capsule(m, {21.0, y + 1.6, 7.8}, {20.8, y + 2.0, 10.7}, 2.4, 2.2), 4.0);
+  const double hollow = std::sqrt(square(m.x - 8.0) + square(m.y - (y + 5.2))) - 11.2;
+  return smoothMax(s, -hollow, 1.6);
 }
 
+/// Hangs from the lamina; rounded in front and to the side, where it fits the hollow of the vertebra below.
 double inferiorArticularOf(const Anatomy& an, const Vec3& m) {
   const double k = an.articular_scale, y = an.canal_apex_y;
-  const Plate blank = plate({11.8, y + 3.4, -17.0}, {0.04, 0.05, -1}, {0.66, 0.75, 0}, 6.8 * k, 2.9 * k);
-  return blank.nearest(m).distance - 3.5;
+  const Plate blade = plate({12.2, y + 1.8, -14.8}, {-0.03, 0.12, -1}, {0.74, 0.67, 0}, {7.7 * k, 3.6 * k, 3.4 * k});
+  const Plate::Local at = blade.nearest(m);
+  return at.distance - (3.2 - 0.05 * at.along);
 }
 
-double archOf(const Anatomy& an, const Vec3& p) {
-  const double y = an.canal_apex_y;
+/// Joins `part(m)` to s by smoothMin, skipping it where it cannot matter: every part stays outside its ball, and
+/// beyond k the smooth union is the plain one. The result is the same to the bit; tests compare.
+struct Ball {
+  Vec3 centre;
+  double radius;
+};
+
+template <class Part>
+double joined(double s, double k, const Ball& ball, const Vec3& m, const Part& part) {
+  const Vec3 d = m - ball.centre;
+  const double reach = s + k + ball.radius;
+  if (reach < 0 || dot(d, d) > reach * reach) return s;
+  return smoothMin(s, part(), k);
+}
+
+double archOf(const Anatomy& an, const Vec3& p, bool cull) {
+  const double y = an.canal_apex_y, all = cull ? 0.0 : 1e3;
   const Vec3 m{fromMidline(p.x), p.y, p.z};
-  double s = smoothMin(pedicleOf(an, m), capsule(m, {17.0, y - 5.0, 4.0}, {12.4, y + 2.0, -12.0}, 4.4, 3.8), 5.0);
-  s = smoothMin(s, laminaOf(an, m), 4.0);
-  s = smoothMin(s, inferiorArticularOf(an, m), 4.0);
-  s = smoothMin(s, spinousOf(an, p), 5.0);
-  s = smoothMin(s, transverseOf(an, m), 5.0);
-  s = smoothMin(s, norm(m - Vec3{23.0, y - 1.5, -1.0}) - 1.8, 4.0);  // accessory process
-  s = smoothMin(s, superiorArticularOf(an, m), 3.0);
+  const double span = an.transverse_span, tip = an.spinous_tip_y;
+  double s = pedicleOf(an, m);
+  s = joined(s, 4.0, {{11.0, y - 2.0, -6.0}, 19.0 + all}, m, [&] { return laminaOf(an, m); });
+  s = joined(s, 5.0, {{12.2, y + 2.4, -14.8}, 13.5 + all}, m, [&] { return inferiorArticularOf(an, m); });
+  s = joined(s, 7.0, {{0, 0.5 * (y + tip), -11.2}, 0.5 * (tip - y) + 15.0 + all}, p, [&] { return spinousOf(an, p); });
+  s = joined(s, 6.0, {{0.5 * (span + 17.0), y - 2.0, 4.0}, 0.5 * (span - 17.0) + 11.0 + all}, m,
+             [&] { return transverseOf(an, m); });
+  s = joined(s, 4.0, {{23.5, y - 2.5, -1.5}, 1.5 + all}, m,
+             [&] { return norm(m - Vec3{23.5, y - 2.5, -1.5}) - 1.4; });  // accessory process
+  s = joined(s, 4.0, {{18.5, y - 2.0, 9.0}, 13.5 + all}, m, [&] { return superiorArticularOf(an, m); });
   return smoothMax(s, -canalOf(an, p), 2.5);
+}
+
+double bone(const Anatomy& an, const Vec3& local, bool cull) {
+  const Vec3 p = warped(an, local);
+  constexpr double kBlend = 4.5;
+  const double body = bodyOf(an, p);
+  // No part of the arch is in front of y = 2.
+  if (cull && 2.0 - p.y > body + kBlend) return body;
+  return smoothMin(body, archOf(an, p, cull), kBlend);
 }
 
 }  // namespace
@@ -143,7 +183,7 @@ Anatomy Anatomy::make(std::uint64_t seed) {
   Anatomy an;
   const auto vary = [&random](double& value, double part) { value *= random.uniform(1.0 - part, 1.0 + part); };
   vary(an.rim_half_width, 0.03);
-  an.waist_half_width = an.rim_half_width * random.uniform(0.875, 0.905);
+  an.waist_half_width = an.rim_half_width * random.uniform(0.85, 0.88);
   vary(an.rim_half_depth, 0.03);
   an.waist_half_depth = an.rim_half_depth * random.uniform(0.905, 0.93);
   vary(an.half_height, 0.025);
@@ -162,10 +202,9 @@ Anatomy Anatomy::make(std::uint64_t seed) {
   return an;
 }
 
-double boneDistance(const Anatomy& an, const Vec3& local) {
-  const Vec3 p = warped(an, local);
-  return smoothMin(bodyOf(an, p), archOf(an, p), 4.5);
-}
+double boneDistance(const Anatomy& an, const Vec3& local) { return bone(an, local, true); }
+
+double boneDistanceUnskipped(const Anatomy& an, const Vec3& local) { return bone(an, local, false); }
 
 double bodyDistance(const Anatomy& an, const Vec3& local) { return bodyOf(an, warped(an, local)); }
 

@@ -9,12 +9,12 @@ namespace spinaltap::phantom {
 
 /// Dimensions in mm and radians. The defaults are a middling adult L3; make() varies them.
 struct Anatomy {
-  double rim_half_width = 24.3, waist_half_width = 21.6;  ///< body, side to side
+  double rim_half_width = 24.3, waist_half_width = 20.9;  ///< body, side to side
   double rim_half_depth = 17.0, waist_half_depth = 15.6;  ///< body, front to back
   double half_height = 14.3;                              ///< body, at the rims
   double wedge = 0.025;                                   ///< front minus back height, per mm of depth and endplate
-  double endplate_dish = 1.9;                             ///< depth of the endplates' concavity
-  double kidney = 0.0058;                                 ///< how far the section is bent backwards, per mm^2 of x
+  double endplate_dish = 2.2;                             ///< depth of the endplates' concavity
+  double kidney = 0.0120;                                 ///< how far the section is bent backwards, per mm^2 of x
   double pedicle_half_width = 4.6, pedicle_half_height = 7.3;
   double pedicle_angle = 0.21;  ///< medially towards the front, in the transverse plane
   double canal_half_width = 11.4, canal_apex_y = 33.0;
@@ -28,6 +28,8 @@ struct Anatomy {
 
 /// mm, negative inside bone.
 [[nodiscard]] double boneDistance(const Anatomy& anatomy, const Vec3& local);
+/// The same with every part evaluated: the slow twin, for tests.
+[[nodiscard]] double boneDistanceUnskipped(const Anatomy& anatomy, const Vec3& local);
 
 /// Which tissue stands where, for the HU. Both are distances like boneDistance.
 [[nodiscard]] double bodyDistance(const Anatomy& anatomy, const Vec3& local);

@@ -51,7 +51,8 @@ double exitAlong(const Anatomy& an, const Vec3& from, const Vec3& direction) {
 
 PediclePath pathOf(const Anatomy& an, const Frame& frame, Side which) {
   const double side = which == Side::Left ? 1.0 : -1.0;
-  const Vec3 isthmus = pedicleIsthmus(an, side), ahead = pedicleAxis(an, side);
+  // A little below the middle of the pedicle, so that the drill enters under the superior articular process.
+  const Vec3 isthmus = pedicleIsthmus(an, side) - Vec3{0, 0, 1.6}, ahead = pedicleAxis(an, side);
   const Vec3 across = cross(ahead, {0, 0, 1}), up{0, 0, 1};
   const double front = exitAlong(an, isthmus, ahead), back = exitAlong(an, isthmus, -ahead);
   // The body begins where its own surface crosses the axis.
@@ -73,7 +74,7 @@ Phantom Phantom::make(const PhantomOptions& options) {
   state->options = options;
   state->anatomy = Anatomy::make(options.seed);
   state->frame = placed(options.seed);
-  state->tissue = Tissue::make(options.seed, options.osteoporotic);
+  state->tissue = {mix64(options.seed ^ 0x7469737375ULL), options.osteoporotic};
   state->left = pathOf(state->anatomy, state->frame, Side::Left);
   state->right = pathOf(state->anatomy, state->frame, Side::Right);
   return Phantom(std::move(state));
@@ -131,12 +132,14 @@ double Phantom::distanceToSurface(const Vec3& patient) const {
 
 double Phantom::trueHu(const Vec3& patient) const {
   const Vec3 local = state_->frame.toLocal(patient);
-  return state_->tissue.hu(state_->anatomy, local, boneDistance(state_->anatomy, local));
+  const double s = boneDistance(state_->anatomy, local);
+  return s < 0 ? state_->tissue.boneHu(state_->anatomy, local, -s) : state_->tissue.softHu(state_->anatomy, local);
 }
 
 const PediclePath& Phantom::pedicle(Side side) const { return side == Side::Left ? state_->left : state_->right; }
 const Frame& Phantom::frame() const { return state_->frame; }
 const Anatomy& Phantom::anatomy() const { return state_->anatomy; }
+const Tissue& Phantom::tissue() const { return state_->tissue; }
 const PhantomOptions& Phantom::options() const { return state_->options; }
 
 Vec3 Phantom::seedPoint() const { return state_->frame.toPatient({0, -2, -1}); }

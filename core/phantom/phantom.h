@@ -8,6 +8,7 @@
 #include "core/base/field.h"
 #include "core/base/frame.h"
 #include "core/phantom/anatomy.h"
+#include "core/phantom/tissue.h"
 
 namespace spinaltap::phantom {
 
@@ -48,7 +49,7 @@ class Phantom {
   /// signedDistance and gradient as a callback, with kLipschitz; keeps the shape alive.
   [[nodiscard]] Field field() const;
   /// |signedDistance(a) - signedDistance(b)| <= kLipschitz |a - b| everywhere; see anatomy.cpp and the tests.
-  static constexpr double kLipschitz = 1.6;
+  static constexpr double kLipschitz = 1.4;
 
   /// Distance in mm to the surface point that is found nearest, negative inside bone. Within 2 mm of the surface this
   /// is the true distance to 1e-6 mm except near the medial axis; farther away it is an upper bound. Use it to measure.
@@ -61,6 +62,7 @@ class Phantom {
   /// The vertebra's own axes: origin at the middle of the body, x left, y back, z head.
   [[nodiscard]] const Frame& frame() const;
   [[nodiscard]] const Anatomy& anatomy() const;
+  [[nodiscard]] const Tissue& tissue() const;
   [[nodiscard]] const PhantomOptions& options() const;
   /// A place deep in cancellous bone, for region growing.
   [[nodiscard]] Vec3 seedPoint() const;

@@ -21,26 +21,28 @@ inline double smoothStep(double low, double high, double x) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-/// A rectangle, rounded by a radius: the blank from which processes and plates are made.
+/// A flat rectangle with rounded corners: given a thickness, the blank from which processes and plates are made.
 struct Plate {
   Vec3 centre;
   Vec3 along, across;  ///< orthonormal, in the rectangle's plane
   double half_length = 0, half_width = 0;
+  double corner = 0;  ///< radius of the corners, at most the smaller half, wherever the taper makes it smallest
 
   struct Local {
-    double along, across, distance;  ///< where on the rectangle (clamped) the nearest place is, and how far
+    double along, across;  ///< the place on the rectangle, clamped to it
+    double off;            ///< height over its plane, signed
+    double distance;       ///< to the rounded rectangle
   };
-  /// @param taper  change of half_width per mm along.  Gradient at most 1 + |taper|.
+  /// @param taper  change of half_width per mm along.  Gradient of `distance` at most 1 + |taper|.
   [[nodiscard]] Local nearest(const Vec3& p, double taper = 0) const {
     const Vec3 d = p - centre;
-    const double u = dot(d, along), v = dot(d, across);
-    const Vec3 normal = cross(along, across);
-    const double w = dot(d, normal);
+    const double u = dot(d, along), v = dot(d, across), w = dot(d, cross(along, across));
     const double cu = std::clamp(u, -half_length, half_length);
     const double half = half_width + taper * cu;
-    const double cv = std::clamp(v, -half, half);
-    const double du = u - cu, dv = v - cv;
-    return {cu, cv, std::sqrt(du * du + dv * dv + w * w)};
+    const double du = std::max(std::fabs(u) - (half_length - corner), 0.0);
+    const double dv = std::max(std::fabs(v) - (half - corner), 0.0);
+    const double in_plane = std::max(std::sqrt(du * du + dv * dv) - corner, 0.0);
+    return {cu, std::clamp(v, -half, half), w, std::sqrt(in_plane * in_plane + w * w)};
   }
 };
 

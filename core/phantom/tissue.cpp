@@ -36,30 +36,59 @@ double noise(std::uint64_t seed, const Vec3& p, double cell) {
 
 double mixed(double a, double b, double t) { return a + (b - a) * t; }
 
-}  // namespace
-
-Tissue Tissue::make(std::uint64_t seed, bool osteoporotic) {
-  Tissue tissue;
-  tissue.seed = mix64(seed ^ 0x7469737375ULL);
-  if (osteoporotic) {
-    tissue.shell_mm = 0.5;
-    tissue.cortical_hu = 800;
-    tissue.cancellous_low_hu = 65;
-    tissue.cancellous_high_hu = 85;
-  }
-  return tissue;
+/// An ellipse in the transverse plane: below 1 inside.
+double ellipse(const Vec3& p, double x, double y, double a, double b) {
+  const double u = (p.x - x) / a, v = (p.y - y) / b;
+  return std::sqrt(u * u + v * v);
 }
 
-double Tissue::hu(const Anatomy& anatomy, const Vec3& local, double bone_distance) const {
-  if (bone_distance > 0) {
-    if (canalDistance(anatomy, local) < 0) return 30;
-    return 50 + 8 * noise(seed + 1, local, 6.0);
+constexpr double kFat = -95, kAir = -1000;
+
+}  // namespace
+
+double Tissue::shellThickness(const Vec3& local) const {
+  const double arch = smoothStep(14.0, 21.0, local.y);
+  return mixed(1.0, 1.5, arch) * (osteoporotic ? 0.5 : 1.0);
+}
+
+double Tissue::boneHu(const Anatomy& anatomy, const Vec3& local, double depth_mm) const {
+  const double arch = smoothStep(14.0, 21.0, local.y);
+  const double shell = shellThickness(local);
+  const double inside = smoothStep(shell - 0.2, shell + 0.2, depth_mm);
+  const double dense = std::max(0.8 * arch, smoothStep(0.35, 1.0, std::fabs(local.z) / anatomy.half_height));
+  const double grain = inside > 0 ? 0.65 * noise(seed + 2, local, 1.7) + 0.35 * noise(seed + 3, local, 5.0) : 0.0;
+  const double cancellous = osteoporotic ? mixed(68, 80, dense) + 11 * grain : mixed(160, 205, dense) + 27 * grain;
+  const double cortical =
+      mixed(osteoporotic ? 700 : 820, osteoporotic ? 900 : 1080, arch) + 90 * noise(seed + 4, local, 6.0);
+  const double low = osteoporotic ? 60 : 140, high = osteoporotic ? 90 : 230;
+  return mixed(cortical, std::clamp(cancellous, low, high), inside);
+}
+
+double Tissue::softHu(const Anatomy& an, const Vec3& p) const {
+  const double skin = ellipse(p, 0, -16, 165, 113);
+  if (skin > 1) return kAir;
+  if (skin > 0.985) return 20;
+  const double ripple = noise(seed + 5, p, 14.0), grain = 5 * noise(seed + 6, p, 4.0);
+  if (skin > 0.86 + 0.03 * ripple) return kFat + grain;  // under the skin
+  if (canalDistance(an, p) < 0.4 && p.y > 12) {
+    const bool sac = ellipse(p, 0, an.canal_apex_y - 9.5, 9.6, 6.6) < 1;
+    return sac ? 30 + grain : 12 + grain;  // fat and vessels around the sac, in part
   }
-  const double arch = smoothStep(13.0, 22.0, local.y);
-  const double shell = shell_mm * mixed(1.0, 1.4, arch);
-  const double endplate = smoothStep(0.3, 1.0, std::fabs(local.z) / anatomy.half_height);
-  const double cancellous = mixed(cancellous_low_hu, cancellous_high_hu, endplate) + 12 * noise(seed + 2, local, 2.0);
-  return mixed(cortical_hu, cancellous, smoothStep(shell - 0.15, shell + 0.15, -bone_distance));
+  if (ellipse(p, 0, -0.5, an.rim_half_width + 0.3, an.rim_half_depth + 0.3) < 1) return 80 + grain;  // discs
+  if (ellipse(p, 8, -31, 9.5, 9.5) < 1 || ellipse(p, -16, -30, 12, 9) < 1) return 44 + grain;        // aorta, vena cava
+  const double x = std::fabs(p.x);
+  if (ellipse({x, p.y, 0}, 40, 8, 15 + 2 * ripple, 20) < 1) return 54 + grain;  // psoas
+  if (p.y > 24) {
+    // Back muscles: two masses a side, with fat between them and the spinous process's ligaments in the middle.
+    const bool inner = ellipse({x, p.y, 0}, 19, 54, 16.5 + ripple, 22) < 1;
+    const bool outer = ellipse({x, p.y, 0}, 51, 52, 23, 21 + 2 * ripple) < 1 && !inner;
+    const double streak = noise(seed + 7, {p.x, p.y, 0.3 * p.z}, 6.0);
+    if ((inner || outer) && streak < 0.62) return 52 + grain;
+    if (x < 2.6 && p.y < an.spinous_tip_y + 4) return 46 + grain;
+    return kFat + grain;
+  }
+  if (p.y < -20 && noise(seed + 8, p, 22.0) > 0.1) return 40 + grain;  // bowel among fat
+  return kFat + grain;
 }
 
 }  // namespace spinaltap::phantom

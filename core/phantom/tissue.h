@@ -1,6 +1,6 @@
-// core/phantom/tissue.h - the HU of every tissue in and around the vertebra.
-// Ranges: cortical 600-1200, cancellous 140-230 (osteoporotic 60-90), muscle 40-60, fat -90, canal 30, disc 80, air
-// -1000.
+// core/phantom/tissue.h - the HU of every tissue in and around the vertebra, without noise or blur.
+// cortical 600-1200; cancellous 140-230 (osteoporotic 60-90), denser near the endplates; muscle and vessels 40-60;
+// fat about -95; canal about 30; discs about 80; air -1000 outside the skin.
 #pragma once
 #include <cstdint>
 
@@ -10,13 +10,15 @@ namespace spinaltap::phantom {
 
 struct Tissue {
   std::uint64_t seed = 1;
-  double shell_mm = 1.0;  ///< cortex of the body; the arch's is thicker
-  double cortical_hu = 950, cancellous_low_hu = 150, cancellous_high_hu = 215;
+  bool osteoporotic = false;
 
-  [[nodiscard]] static Tissue make(std::uint64_t seed, bool osteoporotic);
-
-  /// HU at a place in the vertebra's frame, given its boneDistance there.
-  [[nodiscard]] double hu(const Anatomy& anatomy, const Vec3& local, double bone_distance) const;
+  /// HU inside bone. @param depth_mm  how deep under the surface: -boneDistance.
+  [[nodiscard]] double boneHu(const Anatomy& anatomy, const Vec3& local, double depth_mm) const;
+  /// HU of what surrounds the bone; defined everywhere, as if the bone were not there.
+  [[nodiscard]] double softHu(const Anatomy& anatomy, const Vec3& local) const;
+  /// Thickness of the cortex: about 1 mm on the body, half as much again on pedicles and arch; half of it when
+  /// osteoporotic.
+  [[nodiscard]] double shellThickness(const Vec3& local) const;
 };
 
 }  // namespace spinaltap::phantom
