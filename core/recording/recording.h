@@ -73,8 +73,12 @@ struct ReplayReport {
   std::uint64_t first_difference = 0;  ///< cycle of the first checkpoint that differs; 0 when none does
 };
 
-/// Runs the inputs through a fresh session. progress(fraction) may be empty.
+/// each(input, output), refused inputs included; output.removed_indices is valid during the call.
+using Observer = std::function<void(const session::Input&, const session::Output&)>;
+
+/// Runs the inputs through a fresh session. progress(fraction) and each may be empty.
 /// @error as session::Session::create.
-[[nodiscard]] Result<ReplayReport> replay(const Recording& recording, const std::function<void(double)>& progress = {});
+[[nodiscard]] Result<ReplayReport> replay(const Recording& recording, const std::function<void(double)>& progress = {},
+                                          const Observer& each = {});
 
 }  // namespace spinaltap::recording

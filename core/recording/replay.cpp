@@ -37,7 +37,8 @@ class Comparison {
 
 }  // namespace
 
-Result<ReplayReport> replay(const Recording& recording, const std::function<void(double)>& progress) {
+Result<ReplayReport> replay(const Recording& recording, const std::function<void(double)>& progress,
+                            const Observer& each) {
   Result<session::Session> session = session::Session::create(recording.volume, recording.header.config);
   if (!session) return tl::unexpected(session.error());
   ReplayReport report;
@@ -46,6 +47,7 @@ Result<ReplayReport> replay(const Recording& recording, const std::function<void
   comparison.at(0, report.state_hash);
   for (std::size_t i = 0; i < recording.inputs.size(); ++i) {
     const session::Output output = session->step(recording.inputs[i]);
+    if (each) each(recording.inputs[i], output);
     report.cycles = output.cycle;
     report.state_hash = output.state_hash;
     comparison.at(output.cycle, output.state_hash);
