@@ -208,6 +208,11 @@ double boneDistanceUnskipped(const Anatomy& an, const Vec3& local) { return bone
 
 double bodyDistance(const Anatomy& an, const Vec3& local) { return bodyOf(an, warped(an, local)); }
 
+double bodyOutline(const Anatomy& an, const Vec3& local) {
+  const Section s = section(an, warped(an, local));
+  return (s.value - 1.0) * s.scale;
+}
+
 double canalDistance(const Anatomy& an, const Vec3& local) { return canalOf(an, warped(an, local)); }
 
 Vec3 pedicleIsthmus(const Anatomy& an, double side) {

@@ -33,6 +33,8 @@ struct Anatomy {
 
 /// Which tissue stands where, for the HU. Both are distances like boneDistance.
 [[nodiscard]] double bodyDistance(const Anatomy& anatomy, const Vec3& local);
+/// Across the body's axis only: the body's column, continued into the discs.
+[[nodiscard]] double bodyOutline(const Anatomy& anatomy, const Vec3& local);
 [[nodiscard]] double canalDistance(const Anatomy& anatomy, const Vec3& local);
 
 /// The middle of the left (side = 1) or right (-1) pedicle's isthmus, and the unit axis towards the front.

@@ -212,7 +212,7 @@ volume::Grid ctGrid(const Phantom& phantom, const CtOptions& options) {
   grid.dims = options.dims;
   grid.spacing_mm = {options.pixel_mm, options.pixel_mm, options.spacing_mm};
   // The arch reaches farthest up and down; the skin of the back is in view.
-  const Vec3 middle = phantom.frame().toPatient({0, 30, -4.6});
+  const Vec3 middle = phantom.frame().toPatient({0, 30, -4.1});
   grid.origin_patient =
       middle - Vec3{0.5 * (options.dims[0] - 1) * options.pixel_mm, 0.5 * (options.dims[1] - 1) * options.pixel_mm,
                     0.5 * (options.dims[2] - 1) * options.spacing_mm};

@@ -69,15 +69,15 @@ double Tissue::softHu(const Anatomy& an, const Vec3& p) const {
   if (skin > 1) return kAir;
   if (skin > 0.985) return 20;
   const double ripple = noise(seed + 5, p, 14.0), grain = 5 * noise(seed + 6, p, 4.0);
-  if (skin > 0.86 + 0.03 * ripple) return kFat + grain;  // under the skin
-  if (canalDistance(an, p) < 0.4 && p.y > 12) {
+  if (skin > 0.86 + 0.03 * ripple) return kFat + grain;                                       // under the skin
+  if (std::fabs(p.z) > 0.75 * an.half_height && bodyOutline(an, p) < 0.3) return 80 + grain;  // discs
+  if (canalDistance(an, p) < 0.4 && bodyOutline(an, p) > -1) {
     const bool sac = ellipse(p, 0, an.canal_apex_y - 9.5, 9.6, 6.6) < 1;
     return sac ? 30 + grain : 12 + grain;  // fat and vessels around the sac, in part
   }
-  if (ellipse(p, 0, -0.5, an.rim_half_width + 0.3, an.rim_half_depth + 0.3) < 1) return 80 + grain;  // discs
-  if (ellipse(p, 8, -31, 9.5, 9.5) < 1 || ellipse(p, -16, -30, 12, 9) < 1) return 44 + grain;        // aorta, vena cava
+  if (ellipse(p, 8, -31, 9.5, 9.5) < 1 || ellipse(p, -16, -30, 12, 9) < 1) return 44 + grain;  // aorta, vena cava
   const double x = std::fabs(p.x);
-  if (ellipse({x, p.y, 0}, 40, 8, 15 + 2 * ripple, 20) < 1) return 54 + grain;  // psoas
+  if (ellipse({x, p.y, 0}, 38, 9, 16.5 + 2 * ripple, 20) < 1) return 54 + grain;  // psoas
   if (p.y > 24) {
     // Back muscles: two masses a side, with fat between them and the spinous process's ligaments in the middle.
     const bool inner = ellipse({x, p.y, 0}, 19, 54, 16.5 + ripple, 22) < 1;
@@ -87,7 +87,9 @@ double Tissue::softHu(const Anatomy& an, const Vec3& p) const {
     if (x < 2.6 && p.y < an.spinous_tip_y + 4) return 46 + grain;
     return kFat + grain;
   }
-  if (p.y < -20 && noise(seed + 8, p, 22.0) > 0.1) return 40 + grain;  // bowel among fat
+  const Vec3 turned{0.8 * p.x + 0.6 * p.y, 0.8 * p.y - 0.6 * p.x, p.z};
+  if (p.y < -20 && noise(seed + 8, turned, 24.0) + 0.4 * noise(seed + 9, p, 11.0) > 0.1)
+    return 40 + grain;  // bowel among fat
   return kFat + grain;
 }
 
