@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "tests/scenes/bits.h"
+
 namespace spinaltap::session {
 namespace {
 
@@ -20,6 +22,10 @@ const Golden kGolden[] = {
 
 TEST(Scenes, EndInTheGoldenHashes) {
   for (const Golden& golden : kGolden) {
+    if (golden.scene == "bits") {
+      EXPECT_EQ(hashOfBits(), golden.state_hash);
+      continue;
+    }
     SCOPED_TRACE(golden.scene + " " + golden.engine + " " + std::to_string(golden.discs) + " discs");
     const auto result = runScene(*sceneNamed(golden.scene), golden.engine, golden.cycles, golden.discs);
     ASSERT_TRUE(result.has_value()) << result.error().message;
