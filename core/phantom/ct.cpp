@@ -199,9 +199,9 @@ std::int16_t stored(float hu) {
 
 }  // namespace
 
-CtOptions CtOptions::coarser(int factor) {
+CtOptions CtOptions::coarser(double factor) {
   CtOptions options;
-  options.dims = {options.dims[0] / factor, options.dims[1] / factor, options.dims[2] / factor + 1};
+  for (int& n : options.dims) n = static_cast<int>(std::ceil(n / factor));
   options.pixel_mm *= factor;
   options.spacing_mm *= factor;
   return options;

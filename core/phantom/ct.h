@@ -21,7 +21,8 @@ struct CtOptions {
   std::uint64_t seed = 1;     ///< of the noise
 
   /// The same field of view with `factor` times wider voxels in the plane and along z, for quick tests.
-  [[nodiscard]] static CtOptions coarser(int factor);
+  /// @pre factor >= 1.
+  [[nodiscard]] static CtOptions coarser(double factor);
 };
 
 /// Called with the part done, 0 to 1, about once a slice.
