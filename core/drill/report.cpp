@@ -10,7 +10,7 @@
 //
 // Where it leaves bone standing (design, section 7):
 //  - whatever the shaft alone touches: a bit that moves or tilts sideways, a first pose inside the bone, a step along
-//    the path that is longer than the cone (a teleport);
+//    the path that is longer than a spacing;
 //  - the second arc of a ring that a tilted bit's ellipse cuts twice;
 //  - parts of a tilted cone's section beyond the stretched circle.
 // It never removes a point that the reference would not: each one is put to the same predicate.
