@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -36,6 +37,11 @@ struct Cycle {
   std::span<const std::uint32_t> removed_indices;
 };
 
+/// Of the bit; axis is a unit vector.
+struct Pose {
+  Vec3 tip_mm, axis;
+};
+
 enum class Direction : std::uint8_t { None, Medial, Lateral, Cranial, Caudal, Anterior, Posterior };
 [[nodiscard]] std::string_view nameOf(Direction direction);
 
@@ -45,15 +51,16 @@ enum class Direction : std::uint8_t { None, Medial, Lateral, Cranial, Caudal, An
 struct Metrics {
   std::uint64_t cycles = 0, removed = 0, removed_outside_plan = 0;
   double time_s = 0;  ///< first to last cycle
-  double depth_max_mm = 0;
   double peak_thrust_N = 0;
   double mean_thrust_N = 0;  ///< over time, from the first to the last cycle that removed a point
   double mean_feed_mm_per_s =
       0;  ///< depth gained from the first cycle that removed a point to the deepest, over its time
   double removed_mm3 = 0, removed_outside_plan_mm3 = 0;
-  double entry_error_mm = 0;   ///< across the path, where the tip first passes the plane of the entry point
-  double tip_error_mm = 0;     ///< from the deepest tip to the target, in space
-  double angle_error_deg = 0;  ///< between the drilled axis and the path
+  // Of the hole; nothing without a cycle of a spinning bit.
+  std::optional<double> depth_max_mm;     ///< of the tip, along the path
+  std::optional<double> entry_error_mm;   ///< across the path, where the tip first passed the plane of the entry point
+  std::optional<double> tip_error_mm;     ///< from the deepest tip to the target, in space
+  std::optional<double> angle_error_deg;  ///< between the drilled axis and the path
   std::optional<double> axial_angle_error_deg, sagittal_angle_error_deg;  ///< the same, seen along patient z and x
   std::optional<double> breach_mm, plunge_mm;                             ///< only with a field
   Direction breach_direction = Direction::None;
@@ -66,6 +73,7 @@ struct Metrics {
 /// tip.
 class Accumulator {
  public:
+  /// @pre the plan's lattice and bit are valid.
   explicit Accumulator(const Plan& plan);
   void add(const Cycle& cycle);
 
@@ -77,29 +85,36 @@ class Accumulator {
   [[nodiscard]] Metrics finish(const Field* field = nullptr, int medial_patient_x = 0) const;
 
  private:
-  struct Pose {
-    Vec3 tip_mm, axis;
-  };
   void keepPose(const Pose& pose);
+
+  [[nodiscard]] bool isPlanned(std::uint32_t index) const;
+  void addForce(const Cycle& cycle);
+  void addRemoval(const Cycle& cycle);
+  void addPose(const Cycle& cycle);
+  void measureHole(Metrics& metrics) const;
 
   Plan plan_;
   point_volume::DiscTable disc_;
   Metrics sums_;
-  std::vector<Pose> poses_;
+  std::vector<Pose> poses_;  ///< of the spinning bit beyond the entry plane, stride_mm_ apart
   double stride_mm_ = 0.25;
   std::optional<Vec3> entry_, last_tip_;
   std::optional<Pose> deepest_;
-  std::uint64_t first_t_us_ = 0, last_t_us_ = 0, first_cut_us_ = 0, last_cut_us_ = 0, deepest_us_ = 0;
-  double first_cut_depth_mm_ = 0, thrust_integral_ = 0, thrust_at_last_cut_ = 0;
-  bool any_ = false, any_cut_ = false;
+  std::uint64_t first_us_ = 0, last_us_ = 0, deepest_us_ = 0;
+  std::optional<std::uint64_t> first_cut_us_;
+  std::uint64_t last_cut_us_ = 0;
+  double first_cut_depth_mm_ = 0;
+  double thrust_integral_Ns_ = 0;         ///< since the first cut
+  double thrust_integral_at_cut_Ns_ = 0;  ///< up to the last cut
 };
 
 using Value = std::variant<double, std::string>;
 using Named = std::vector<std::pair<std::string, Value>>;
 
-/// Ordered, with units in the keys: cycles, time_s, depth_max_mm, removed, removed_mm3, removed_outside_plan_mm3,
-/// peak_thrust_N, mean_thrust_N, mean_feed_mm_per_s, entry_error_mm, tip_error_mm, angle_error_deg; then, where known,
+/// Ordered, with units in the keys: cycles, time_s, removed, removed_mm3, removed_outside_plan_mm3, peak_thrust_N,
+/// mean_thrust_N, mean_feed_mm_per_s; then, where known, depth_max_mm, entry_error_mm, tip_error_mm, angle_error_deg,
 /// axial_angle_error_deg, sagittal_angle_error_deg, breach_mm, breach_direction, gertzbein_robbins, plunge_mm.
+/// What each means: README.md.
 [[nodiscard]] Named named(const Metrics& metrics);
 /// One JSON object in that order; numbers in the fewest digits that read back the same.
 [[nodiscard]] std::string toJson(const Named& named);

@@ -1,0 +1,112 @@
+// wasm/bindings.cpp - what JavaScript sees of the core. See README.md.
+#include <emscripten/bind.h>
+#include <emscripten/emscripten.h>
+
+#include <cmath>
+
+#include "core/session/scenes.h"
+#include "wasm/binding_help.h"
+#include "wasm/session_binding.h"
+
+// clang-format off
+EM_JS(void, spinaltapThrow, (const char* message, std::uintptr_t stack), {
+  const text = UTF8ToString(message);
+  stackRestore(stack);
+  throw new Error(text);
+});
+// clang-format on
+
+namespace spinaltap::wasm {
+namespace {
+
+using emscripten::val;
+
+struct SceneResult {
+  std::string hash;
+  double removed = 0, cycles = 0;
+};
+
+Result<SceneResult> sceneResult(const std::string& name, const std::string& engine, double cycles, double discs) {
+  const Result<session::Scene> scene = session::sceneNamed(name);
+  if (!scene) return tl::unexpected(scene.error());
+  if (!(discs >= 0 && discs <= 1e6 && cycles >= 0)) return fail(ErrorCode::InvalidArgument, "scene: cycles or discs");
+  const int disc_count = discs == 0 ? session::reportLattice().discs : static_cast<int>(discs);
+  Result<point_volume::PointVolume> volume = session::sceneVolume(disc_count);
+  if (!volume) return tl::unexpected(volume.error());
+  const double length_mm = volume->lattice.spacing_mm * disc_count;
+  Result<session::Session> session =
+      session::Session::create(std::move(*volume), {session::reportBit(), engine.empty() ? "bounded" : engine});
+  if (!session) return tl::unexpected(session.error());
+  const std::uint64_t count =
+      cycles == 0 ? session::sceneCycles(*scene, length_mm) : std::min(wholeOf(cycles), session::kMostSceneCycles);
+  session::Output output;
+  for (std::uint64_t i = 0; i < count; ++i) output = session->step(session::sceneInput(*scene, i));
+  return SceneResult{hexOf(session->stateHash()), static_cast<double>(output.removed_total),
+                     static_cast<double>(output.cycle)};
+}
+
+SceneResult runScene(const std::string& name, const std::string& engine, double cycles, double discs) {
+  return orThrow<SceneResult>([&] { return sceneResult(name, engine, cycles, discs); });
+}
+
+std::string version() { return SPINALTAP_VERSION; }
+
+}  // namespace
+
+[[noreturn]] void throwError(const std::string& message, std::uintptr_t stack) {
+  spinaltapThrow(message.c_str(), stack);
+  __builtin_unreachable();
+}
+
+Result<std::vector<std::byte>> bytesOf(const val& array, const char* what) {
+  if (!array.instanceof(val::global("Uint8Array"))) {
+    return fail(ErrorCode::InvalidArgument, std::string(what) + ": not a Uint8Array");
+  }
+  std::vector<std::byte> bytes(array["length"].as<std::size_t>());
+  val(emscripten::typed_memory_view(bytes.size(), reinterpret_cast<unsigned char*>(bytes.data())))
+      .call<void>("set", array);
+  return bytes;
+}
+
+val bytesToArray(const std::vector<std::byte>& bytes) {
+  return val::global("Uint8Array")
+      .new_(emscripten::typed_memory_view(bytes.size(), reinterpret_cast<const unsigned char*>(bytes.data())));
+}
+
+std::string hexOf(std::uint64_t hash) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
+  return text;
+}
+
+std::uint64_t wholeOf(double number) {
+  constexpr double kMost = 9007199254740992.0;
+  if (!(number > 0)) return 0;
+  return static_cast<std::uint64_t>(number < kMost ? number : kMost);
+}
+
+val floatsOf(const std::vector<splats::Splat>& splats) {
+  std::vector<float> floats;
+  floats.reserve(7 * splats.size());
+  for (const splats::Splat& s : splats) {
+    for (const double v : {s.position_mm.x, s.position_mm.y, s.position_mm.z, s.normal.x, s.normal.y, s.normal.z,
+                           static_cast<double>(s.kind)}) {
+      floats.push_back(static_cast<float>(v));
+    }
+  }
+  return arrayOf("Float32Array", floats);
+}
+
+EMSCRIPTEN_BINDINGS(spinaltap_core) {
+  bindSession();
+  bindPlayer();
+  emscripten::value_object<SceneResult>("SceneResult")
+      .field("hash", &SceneResult::hash)
+      .field("removed", &SceneResult::removed)
+      .field("cycles", &SceneResult::cycles);
+  emscripten::function("runScene", &runScene);
+  emscripten::function("version", &version);
+  emscripten::constant("splatRadiusPerSpacing", splats::kCoveringRadiusPerSpacing);
+}
+
+}  // namespace spinaltap::wasm
