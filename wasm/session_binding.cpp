@@ -1,9 +1,22 @@
 #include "wasm/session_binding.h"
 
 #include <emscripten/bind.h>
+#include <emscripten/emscripten.h>
 
 #include "core/wire/point_volume_message.h"
 #include "wasm/binding_help.h"
+
+// clang-format off
+// Caught here, since an exception thrown through wasm frames would leave them without unwinding.
+EM_JS(int, spinaltapParse, (const char* text), {
+  try {
+    Module["parsedConfig"] = JSON.parse(UTF8ToString(text));
+    return 1;
+  } catch (error) {
+    return 0;
+  }
+});
+// clang-format on
 
 namespace spinaltap::wasm {
 namespace {
