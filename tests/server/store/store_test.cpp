@@ -1,10 +1,7 @@
 #include "server/store/store.h"
 
 #include <gtest/gtest.h>
-// before any sqlite3.h
-#include <soci/soci.h>
-#include <soci/sqlite3/soci-sqlite3.h>
-
+#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -175,10 +172,10 @@ TEST(Store, SeveralThreadsShareOneStore) {
 TEST(Store, RefusesAFolderMadeByANewerProgram) {
   const test::TemporaryFolder folder;
   ASSERT_TRUE(Store::open(folder.path()).has_value());
-  {
-    soci::session sql(soci::sqlite3, "dbname=\"" + (folder.path() / "spinaltap.db").string() + "\"");
-    sql << "UPDATE schema_version SET version = 99";
-  }
+  sqlite3* sql = nullptr;
+  ASSERT_EQ(sqlite3_open((folder.path() / "spinaltap.db").c_str(), &sql), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(sql, "UPDATE schema_version SET version = 99", nullptr, nullptr, nullptr), SQLITE_OK);
+  sqlite3_close(sql);
   const auto refused = Store::open(folder.path());
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);

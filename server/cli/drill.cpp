@@ -1,0 +1,54 @@
+
+#include "server/cli/commands.h"
+#include "server/jobs/drill_job.h"
+#include "server/jobs/trace.h"
+
+namespace spinaltap::cli {
+namespace {
+
+Result<jobs::DrillJob> jobOf(const DrillOptions& options) {
+  jobs::DrillJob job;
+  job.engine = options.engine;
+  job.cycles = options.cycles;
+  job.out = options.out;
+  if (!options.scene.empty()) {
+    const auto scene = session::sceneNamed(options.scene);
+    if (!scene) return tl::unexpected(scene.error());
+    job.scene = *scene;
+    return job;
+  }
+  const auto bytes = store::readFile(options.trace);
+  if (!bytes) return tl::unexpected(bytes.error());
+  const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  auto poses = jobs::parseTrace(text, std::filesystem::path(options.trace).filename().string());
+  if (!poses) return tl::unexpected(poses.error());
+  job.trace = std::move(*poses);
+  return job;
+}
+
+Result<jobs::Figures> onScene(const jobs::DrillJob& job, ProgressBar& bar) {
+  auto site = jobs::siteOfReport();
+  if (!site) return tl::unexpected(site.error());
+  return jobs::drill(nullptr, std::move(*site), job, bar.callback());
+}
+
+Result<jobs::Figures> onCase(const DrillOptions& options, jobs::DrillJob& job, ProgressBar& bar) {
+  auto store = openStore(options.data);
+  if (!store) return tl::unexpected(store.error());
+  auto site = jobs::siteOfPath(*store, options.case_id, options.path_id);
+  if (!site) return tl::unexpected(site.error());
+  job.keep = !options.no_store;
+  return jobs::drill(&*store, std::move(*site), job, bar.callback());
+}
+
+}  // namespace
+
+Result<Outcome> runDrill(const DrillOptions& options, ProgressBar& bar) {
+  auto job = jobOf(options);
+  if (!job) return tl::unexpected(job.error());
+  auto figures = options.volume.empty() ? onCase(options, *job, bar) : onScene(*job, bar);
+  if (!figures) return tl::unexpected(figures.error());
+  return Outcome{std::move(*figures)};
+}
+
+}  // namespace spinaltap::cli

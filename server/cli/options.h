@@ -1,0 +1,68 @@
+// server/cli/options.h - what the user asked for, one struct a subcommand.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/vec3.h"
+#include "core/plan/path.h"
+#include "core/segment/segment.h"
+#include "core/surface/defaults.h"
+#include "server/jobs/plan_job.h"
+
+namespace spinaltap::cli {
+
+struct PhantomOptions {
+  std::string out;
+  bool osteoporotic = false;
+  std::uint64_t seed = 1;
+  int reduce = 1;  ///< voxels this many times wider: quick small stacks for tests
+};
+
+struct ImportOptions {
+  std::string data, from, label_file, name;
+  int label_value = 1, series = 0;
+};
+
+struct SegmentOptions {
+  std::string data, case_id, seed;
+  double threshold_HU = 150;
+  std::string half_box, box_offset;
+  double neck_mm = 0, closing_mm = 1.5;
+};
+
+struct ReconstructOptions {
+  std::string data, case_id;
+  double sample_spacing_mm = surface::kSampleSpacing_mm, tolerance_mm = surface::kFitTolerance_mm;
+  double smoothing_mm = surface::kSmoothing_mm, cell_mm = surface::kCell_mm;
+  std::size_t max_centres = surface::kMaxCentres;
+};
+
+struct PlanOptions {
+  std::string data, case_id, label, entry, target;
+  plan::Bit bit;
+  double radius_mm = 4, spacing_mm = 0.1, lead_mm = jobs::kLead_mm;
+};
+
+struct DrillOptions {
+  std::string data, case_id, path_id, volume, scene, trace, engine = "bounded", out;
+  std::optional<std::uint64_t> cycles;
+  bool no_store = false;
+};
+
+struct ReplayOptions {
+  std::string data, file;
+};
+
+struct ServeOptions {
+  std::string data, address = "127.0.0.1", web;
+  std::vector<std::string> hosts;
+  std::uint16_t port = 8080;
+};
+
+struct CasesOptions {
+  std::string data;
+};
+
+}  // namespace spinaltap::cli

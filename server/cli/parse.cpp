@@ -1,0 +1,227 @@
+// The only file that includes CLI11: what the options are called, and what --help says of them.
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "core/drill/engine.h"
+#include "core/session/scenes.h"
+#include "server/cli/commands.h"
+#include "server/cli/run.h"
+
+namespace spinaltap::cli {
+namespace {
+
+constexpr const char* kDataHelp = "Data folder (default $SPINALTAP_DATA, else ~/.local/share/spinaltap)";
+constexpr int kDone = 0, kFailed = 1, kWrongUsage = 2;
+
+struct Program {
+  CLI::App app{"Drill a vertebra from its CT. Coordinates are DICOM patient coordinates (LPS) in mm."};
+  bool json = false;
+  std::function<Result<Outcome>(ProgressBar&)> command;
+};
+
+/// Three numbers, or wrong usage.
+const CLI::Validator kVec3(
+    [](const std::string& text) {
+      const auto value = parseVec3(text, "it");
+      return value ? std::string() : value.error().message;
+    },
+    "X,Y,Z", "vec3");
+
+/// One of the names that core has.
+CLI::Validator oneOf(const std::vector<std::string_view>& names) {
+  return CLI::IsMember(std::vector<std::string>(names.begin(), names.end()));
+}
+
+/// A subcommand with --json, that remembers what to run.
+template <class Options>
+CLI::App* add(Program& program, const char* name, const char* help, std::shared_ptr<Options> options,
+              Result<Outcome> (*run)(const Options&, ProgressBar&)) {
+  CLI::App* sub = program.app.add_subcommand(name, help);
+  sub->add_flag("--json", program.json, "Print one JSON object");
+  sub->callback(
+      [&program, options, run] { program.command = [options, run](ProgressBar& bar) { return run(*options, bar); }; });
+  return sub;
+}
+
+void addPhantom(Program& program) {
+  auto o = std::make_shared<PhantomOptions>();
+  CLI::App* sub = add(program, "phantom", "Write a DICOM stack of an invented L3, and its ground truth", o, runPhantom);
+  sub->add_option("--out", o->out, "Folder to write: made when it is not there, refused when it holds files")
+      ->required();
+  sub->add_flag("--osteoporotic", o->osteoporotic, "60-90 HU inside a shell of 0.5 mm, not 140-230 HU in 1 mm");
+  sub->add_option("--seed", o->seed, "Varies the anatomy and the noise")->capture_default_str();
+  sub->add_option("--reduce", o->reduce, "Voxels this many times wider: small and quick")
+      ->check(CLI::Range(1, 8))
+      ->capture_default_str();
+}
+
+void addImport(Program& program) {
+  auto o = std::make_shared<ImportOptions>();
+  CLI::App* sub = add(program, "import", "Make a case of a CT; prints its id", o, runImport);
+  sub->add_option("--from", o->from, "Folder of DICOM files, a multi-frame DICOM file, .nii or .nii.gz")->required();
+  CLI::Option* label = sub->add_option("--label", o->label_file, "Label image on the CT's voxels, .nii or .nii.gz");
+  sub->add_option("--label-value", o->label_value, "The value in it that is the vertebra")
+      ->needs(label)
+      ->capture_default_str();
+  sub->add_option("--series", o->series, "Which of several series, numbered as in the refusal (1, 2, ...)");
+  sub->add_option("--name", o->name, "What to call the case; nothing is taken from the files");
+  sub->add_option("--data", o->data, kDataHelp);
+}
+
+void addSegment(Program& program) {
+  auto o = std::make_shared<SegmentOptions>();
+  CLI::App* sub =
+      add(program, "segment", "Find the vertebra's voxels: an imported label is kept, a seed grows", o, runSegment);
+  sub->add_option("CASE", o->case_id, "Case id")->required();
+  CLI::Option* seed =
+      sub->add_option("--seed", o->seed, "x,y,z in the bone, e.g. in the middle of the body")->check(kVec3);
+  sub->add_option("--threshold", o->threshold_HU, "HU from which on it is bone")->needs(seed)->capture_default_str();
+  sub->add_option("--half-box", o->half_box, "x,y,z: growth stays this far from the box's centre (default: no limit)")
+      ->needs(seed)
+      ->check(kVec3);
+  sub->add_option("--box-offset", o->box_offset, "x,y,z: the box's centre, from the seed")->needs(seed)->check(kVec3);
+  sub->add_option("--neck", o->neck_mm, "Bridges narrower than twice this are cut, mm")
+      ->needs(seed)
+      ->capture_default_str();
+  sub->add_option("--closing", o->closing_mm, "Gaps in the cortex up to twice this are bridged, mm")
+      ->needs(seed)
+      ->capture_default_str();
+  sub->add_option("--data", o->data, kDataHelp);
+}
+
+void addReconstruct(Program& program) {
+  auto o = std::make_shared<ReconstructOptions>();
+  CLI::App* sub = add(program, "reconstruct", "Make the smooth surface, its mesh and the density", o, runReconstruct);
+  sub->add_option("CASE", o->case_id, "Case id")->required();
+  sub->add_option("--sample-spacing", o->sample_spacing_mm, "Between boundary points, mm")->capture_default_str();
+  sub->add_option("--tolerance", o->tolerance_mm, "Centres are added until samples are met this closely, mm")
+      ->capture_default_str();
+  sub->add_option("--smoothing", o->smoothing_mm, "Averages the samples' noise, mm; 0 interpolates")
+      ->capture_default_str();
+  sub->add_option("--max-centres", o->max_centres, "No more centres than this")->capture_default_str();
+  sub->add_option("--cell", o->cell_mm, "Size of the mesh's cells, mm")->capture_default_str();
+  sub->add_option("--data", o->data, kDataHelp);
+}
+
+void addPlan(Program& program) {
+  auto o = std::make_shared<PlanOptions>();
+  CLI::App* sub = add(program, "plan", "Plan a path and make its points; prints its id", o, runPlan);
+  sub->add_option("CASE", o->case_id, "Case id")->required();
+  sub->add_option("--entry", o->entry, "x,y,z on the bone's surface")->required()->check(kVec3);
+  sub->add_option("--target", o->target, "x,y,z where the tip shall end")->required()->check(kVec3);
+  sub->add_option("--label", o->label, "What to call the path");
+  sub->add_option("--bit-diameter", o->bit.diameter_mm, "mm")->capture_default_str();
+  sub->add_option("--cone-length", o->bit.cone_length_mm, "Tip to where the cone meets the cylinder, mm")
+      ->capture_default_str();
+  sub->add_option("--bit-length", o->bit.length_mm, "Tip to the end of what is tested against bone, mm")
+      ->capture_default_str();
+  sub->add_option("--radius", o->radius_mm, "Of the cylinder of points around the path, mm")->capture_default_str();
+  sub->add_option("--spacing", o->spacing_mm, "Between points, mm")->capture_default_str();
+  sub->add_option("--lead", o->lead_mm, "The cylinder begins this far before the entry, mm")->capture_default_str();
+  sub->add_option("--data", o->data, kDataHelp);
+}
+
+void addDrill(Program& program) {
+  auto o = std::make_shared<DrillOptions>();
+  CLI::App* sub = add(program, "drill", "Drill without a screen; prints the metrics, keeps a recording", o, runDrill);
+  CLI::Option* path_case = sub->add_option("CASE", o->case_id, "Case id");
+  CLI::Option* path = sub->add_option("PATH", o->path_id, "Path id");
+  path_case->needs(path);
+  sub->add_option("--volume", o->volume, "Instead of CASE PATH: the bare scene volume")
+      ->check(CLI::IsMember({"report"}))
+      ->excludes(path_case);
+  CLI::Option* scene = sub->add_option("--scene", o->scene, "A scripted drill")->check(oneOf(session::sceneNames()));
+  CLI::Option* trace =
+      sub->add_option("--trace", o->trace, "CSV of poses: t_us, tip x y z, axis x y z (path frame, mm)");
+  scene->excludes(trace);
+  sub->add_option("--engine", o->engine, "How points are removed")
+      ->check(oneOf(drill::engineNames()))
+      ->capture_default_str();
+  sub->add_option("--cycles", o->cycles, "At most so many (default: to the end of the path or the trace)");
+  sub->add_option("--out", o->out, "Write the recording here");
+  sub->add_flag("--no-store", o->no_store, "Do not keep the recording with the case");
+  sub->add_option("--data", o->data, kDataHelp);
+  sub->final_callback([o] {
+    if (o->volume.empty() && o->path_id.empty()) throw CLI::RequiredError("CASE and PATH, or --volume report");
+    if (o->scene.empty() && o->trace.empty()) throw CLI::RequiredError("--scene or --trace");
+  });
+}
+
+void addRest(Program& program) {
+  auto replay = std::make_shared<ReplayOptions>();
+  CLI::App* sub = add(program, "replay", "Run a recording again and compare the hashes", replay, runReplay);
+  sub->add_option("FILE", replay->file, "A recording's file, or its id in the data folder")->required();
+  sub->add_option("--data", replay->data, kDataHelp);
+
+  auto serve = std::make_shared<ServeOptions>();
+  sub = add(program, "serve", "Serve cases, pages and live drills until Ctrl-C", serve, runServe);
+  sub->add_option("--data", serve->data, kDataHelp);
+  sub->add_option("--port", serve->port, "0 takes a free one")->capture_default_str();
+  sub->add_option("--address", serve->address, "Address to listen on")->capture_default_str();
+  sub->add_option("--host", serve->hosts, "A further name by which browsers may call it, e.g. behind a proxy");
+  sub->add_option("--web", serve->web, "Folder of the built pages (default: found beside the program)");
+
+  auto cases = std::make_shared<CasesOptions>();
+  sub = add(program, "cases", "List what is in the data folder", cases, runCases);
+  sub->add_option("--data", cases->data, kDataHelp);
+
+  sub = program.app.add_subcommand("version", "What this is");
+  sub->add_flag("--json", program.json, "Print one JSON object");
+  sub->callback([&program] { program.command = [](ProgressBar&) { return runVersion(); }; });
+}
+
+/// CLI11's own message may run over several lines; ours is one.
+int wrongUsage(const Program& program, const CLI::ParseError& error) {
+  std::string name = "spinaltap";
+  for (const CLI::App* sub : program.app.get_subcommands()) name += " " + sub->get_name();
+  printError(std::string(error.what()) + " (see " + name + " --help)");
+  return kWrongUsage;
+}
+
+Result<Outcome> outcomeOf(const Program& program, ProgressBar& bar) {
+  try {
+    return program.command(bar);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::Limit, "not enough memory");
+  } catch (const std::exception& error) {
+    return fail(ErrorCode::Io, error.what());
+  }
+}
+
+int execute(const Program& program) {
+  ProgressBar bar;
+  const auto outcome = outcomeOf(program, bar);
+  bar.wipe();
+  if (!outcome) {
+    printError(outcome.error().message);
+    return kFailed;
+  }
+  if (!outcome->figures.is_null()) print(outcome->figures, program.json);
+  return outcome->done ? kDone : kFailed;
+}
+
+}  // namespace
+
+int run(int argc, char** argv) {
+  Program program;
+  program.app.name("spinaltap");
+  program.app.require_subcommand(1);
+  program.app.set_version_flag("--version", SPINALTAP_VERSION);
+  addPhantom(program);
+  addImport(program);
+  addSegment(program);
+  addReconstruct(program);
+  addPlan(program);
+  addDrill(program);
+  addRest(program);
+  try {
+    program.app.parse(argc, argv);
+  } catch (const CLI::Success& wanted) {  // --help, --version
+    return program.app.exit(wanted);
+  } catch (const CLI::ParseError& error) {
+    return wrongUsage(program, error);
+  }
+  return execute(program);
+}
+
+}  // namespace spinaltap::cli

@@ -1,0 +1,49 @@
+#include "server/jobs/case_files.h"
+
+#include "core/wire/point_volume_message.h"
+
+namespace spinaltap::jobs {
+namespace {
+
+template <class T>
+Result<T> load(store::Store& store, const store::BlobId& id, const std::string& missing,
+               Result<T> (*decode)(std::span<const std::byte>)) {
+  if (id.empty()) return fail(ErrorCode::NotFound, missing);
+  const auto bytes = store.blobs().get(id);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return decode(*bytes);
+}
+
+}  // namespace
+
+Result<volume::CtVolume> loadCt(store::Store& store, const store::Case& row) {
+  return load(store, row.ct, "case " + row.id + " has no CT", decodeCt);
+}
+
+Result<volume::LabelVolume> loadLabel(store::Store& store, const store::Case& row) {
+  return load(store, row.label_blob, "case " + row.id + " has no label yet: segment it first", decodeLabel);
+}
+
+Result<volume::CtVolume> loadRoi(store::Store& store, const store::Case& row) {
+  return load(store, row.roi, "case " + row.id + " is not reconstructed yet", decodeCt);
+}
+
+Result<rbf::Model> loadModel(store::Store& store, const store::Case& row) {
+  return load(store, row.model, "case " + row.id + " is not reconstructed yet", decodeModel);
+}
+
+Result<point_volume::PointVolume> loadPointVolume(store::Store& store, const store::Path& row) {
+  return load(store, row.point_volume, "path " + row.id + " has no point volume", wire::decodePointVolume);
+}
+
+Result<void> checkLabelText(const std::string& text) {
+  if (text.size() > 100) return fail(ErrorCode::InvalidArgument, "label: over 100 bytes");
+  for (const char c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      return fail(ErrorCode::InvalidArgument, "label: holds a control character");
+    }
+  }
+  return {};
+}
+
+}  // namespace spinaltap::jobs

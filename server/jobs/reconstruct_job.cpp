@@ -1,0 +1,118 @@
+#include "server/jobs/reconstruct_job.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/mesh/polygonise.h"
+#include "core/surface/surface.h"
+#include "core/volume/crop.h"
+#include "core/wire/mesh_message.h"
+#include "server/jobs/case_files.h"
+
+namespace spinaltap::jobs {
+namespace {
+
+/// The dense solver's memory and time grow with the square and the cube.
+constexpr std::size_t kMostCentres = 12'000;
+
+struct Region {
+  volume::CtVolume ct;
+  volume::LabelVolume label;
+};
+
+Result<Region> cropRegion(store::Store& store, const store::Case& row) {
+  const auto label = loadLabel(store, row);
+  if (!label) return tl::unexpected(label.error());
+  const auto ct = loadCt(store, row);
+  if (!ct) return tl::unexpected(ct.error());
+  const auto box = volume::boundsOf(*label);
+  if (!box) return tl::unexpected(box.error());
+  const auto roi = volume::widened(*box, ct->grid, kRoiMargin_mm);
+  auto ct_roi = volume::cropTo(*ct, roi.low, roi.high);
+  if (!ct_roi) return tl::unexpected(ct_roi.error());
+  auto label_roi = volume::cropTo(*label, roi.low, roi.high);
+  if (!label_roi) return tl::unexpected(label_roi.error());
+  return Region{std::move(*ct_roi), std::move(*label_roi)};
+}
+
+mesh::PolygoniseOptions meshOptions(const std::vector<Vec3>& points, double cell_mm) {
+  Vec3 low = points.front(), high = points.front();
+  for (const Vec3& p : points) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const Vec3 margin = Vec3{1, 1, 1} * surface::kMeshMargin_mm;
+  return {cell_mm, low - margin, high + margin};
+}
+
+Result<void> keep(store::Store& store, const std::string& case_id, const volume::CtVolume& roi, const rbf::Model& model,
+                  const mesh::TriangleMesh& mesh, const Figures& figures) {
+  store::Reconstruction made;
+  const auto roi_blob = store.blobs().put(encodeCt(roi), store::Gzip::Sibling);
+  if (!roi_blob) return tl::unexpected(roi_blob.error());
+  const auto model_blob = store.blobs().put(encodeModel(model));
+  if (!model_blob) return tl::unexpected(model_blob.error());
+  const auto mesh_blob = store.blobs().put(wire::encodeMesh(mesh), store::Gzip::Sibling);
+  if (!mesh_blob) return tl::unexpected(mesh_blob.error());
+  return store.setReconstruction(case_id, {*roi_blob, *model_blob, *mesh_blob, figures.dump()});
+}
+
+std::function<void(double)> stage(const Progress& progress, const char* name) {
+  if (!progress) return {};
+  return [&progress, name](double fraction) { progress(name, fraction); };
+}
+
+}  // namespace
+
+Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, const Progress& progress) {
+  if (job.max_centres > kMostCentres) {
+    return fail(ErrorCode::Limit, "over " + std::to_string(kMostCentres) + " centres: the dense solver would not end");
+  }
+  Stopwatch total, watch;
+  const auto row = store.findCase(job.case_id);
+  if (!row) return tl::unexpected(row.error());
+  const auto region = cropRegion(store, *row);
+  if (!region) return tl::unexpected(region.error());
+
+  surface::BoundaryOptions boundary;
+  boundary.spacing_mm = job.sample_spacing_mm;
+  const auto points = surface::findBoundary(region->ct, region->label, boundary, stage(progress, "boundary"));
+  if (!points) return tl::unexpected(points.error());
+  auto signed_samples = surface::makeSamples(*points);
+  if (!signed_samples) return tl::unexpected(signed_samples.error());
+  const double boundary_s = watch.lap_s();
+
+  const rbf::Samples samples{std::move(signed_samples->positions), std::move(signed_samples->distances_mm)};
+  const auto fit = rbf::fit(samples, {job.tolerance_mm, job.smoothing_mm, job.max_centres}, stage(progress, "fit"));
+  if (!fit) return tl::unexpected(fit.error());
+  const double fit_s = watch.lap_s();
+
+  const Field field = rbf::asField(fit->model, lipschitzOf(fit->model));
+  const auto mesh = mesh::polygonise(field, points->positions_patient,
+                                     meshOptions(points->positions_patient, job.cell_mm), stage(progress, "mesh"));
+  if (!mesh) return tl::unexpected(mesh.error());
+  const double mesh_s = watch.lap_s();
+
+  Figures figures{{"case_id", row->id},
+                  {"boundary_points", points->positions_patient.size()},
+                  {"boundary_points_from_ct", points->from_ct},
+                  {"samples", fit->report.samples},
+                  {"centres", fit->report.centres},
+                  {"residual_max_mm", fit->report.residual_max_mm},
+                  {"residual_rms_mm", fit->report.residual_rms_mm},
+                  {"reached_tolerance", fit->report.reached_tolerance},
+                  {"tolerance_mm", job.tolerance_mm},
+                  {"sum_abs_weights", fit->report.sum_abs_weights},
+                  {"vertices", mesh->vertices.size()},
+                  {"triangles", mesh->triangles.size()},
+                  {"roi_dims", region->ct.grid.dims},
+                  {"boundary_s", boundary_s},
+                  {"fit_s", fit_s},
+                  {"mesh_s", mesh_s},
+                  {"total_s", total.lap_s()}};
+  const auto kept = keep(store, row->id, region->ct, fit->model, *mesh, figures);
+  if (!kept) return tl::unexpected(kept.error());
+  return figures;
+}
+
+}  // namespace spinaltap::jobs

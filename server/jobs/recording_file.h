@@ -1,0 +1,45 @@
+// server/jobs/recording_file.h - a recording that grows on disk while somebody drills.
+#pragma once
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "core/metrics/metrics.h"
+#include "core/recording/recording.h"
+#include "server/store/store.h"
+
+namespace spinaltap::jobs {
+
+/// live/<recording id>.rec in the data folder, locked while it is written. What was flushed survives a crash of the
+/// program; recoverRecordings() brings it in.
+class RecordingFile {
+ public:
+  /// @error Io.
+  [[nodiscard]] static Result<RecordingFile> begin(store::Store& store, const recording::Header& header,
+                                                   const point_volume::PointVolume& volume);
+  RecordingFile(RecordingFile&&) noexcept;
+  RecordingFile& operator=(RecordingFile&&) noexcept;
+  ~RecordingFile();  ///< without keep(): the file stays for recoverRecordings()
+
+  /// Keeps the input, and puts what is waiting on disk about once a second. @error Io.
+  [[nodiscard]] Result<void> append(const session::Input& input, const session::Output& output);
+
+  /// Ends the file, moves it among the blobs and adds its row.
+  /// @param complete  the drill was finished by its trainee, not cut off. @error Io, NotFound.
+  [[nodiscard]] Result<store::Recording> keep(bool complete, const std::string& metrics_json);
+  /// Forgets the recording.
+  void discard();
+
+  [[nodiscard]] const std::string& id() const;
+
+ private:
+  struct State;
+  explicit RecordingFile(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// Brings in recordings whose writer is gone. Returns how many; files that hold nothing readable are removed.
+int recoverRecordings(store::Store& store);
+
+}  // namespace spinaltap::jobs

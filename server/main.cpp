@@ -1,0 +1,3 @@
+#include "server/cli/run.h"
+
+int main(int argc, char** argv) { return spinaltap::cli::run(argc, argv); }
