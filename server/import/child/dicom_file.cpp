@@ -6,67 +6,47 @@
 
 #include <algorithm>
 #include <array>
+#include <istream>
 #include <new>
-#include <streambuf>
 #include <string_view>
 
+#include "server/import/child/dicom_bytes.h"
 #include "server/import/child/dicom_values.h"
 
 namespace spinaltap::importer {
 
 namespace {
 
-/// A stream over bytes that are already in memory: nothing has to be opened inside the sandbox, nothing is copied.
-class MemoryBuffer : public std::streambuf {
+/// GDCM's image reader goes on to the end of the file; what stands after the pixels is not our concern.
+class PixelReader : public gdcm::ImageReader {
  public:
-  explicit MemoryBuffer(const std::string& bytes) {
-    char* begin = const_cast<char*>(bytes.data());  // the get area is never written
-    setg(begin, begin, begin + bytes.size());
-  }
-
- protected:
-  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override {
-    const off_type size = egptr() - eback();
-    const off_type base = from == std::ios_base::beg ? 0 : from == std::ios_base::cur ? gptr() - eback() : size;
-    const off_type target = base + offset;
-    if (target < 0 || target > size) return pos_type(off_type(-1));
-    setg(eback(), eback() + target, egptr());
-    return target;
-  }
-  pos_type seekpos(pos_type target, std::ios_base::openmode mode) override {
-    return seekoff(off_type(target), std::ios_base::beg, mode);
+  bool readPixels(bool multi_frame) {
+    if (!ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010))) return false;
+    GetImage().SetTransferSyntax(GetFile().GetHeader().GetDataSetTransferSyntax());
+    return ReadImage(multi_frame ? gdcm::MediaStorage::EnhancedCTImageStorage : gdcm::MediaStorage::CTImageStorage);
   }
 };
 
-/// GDCM wants a Part 10 file: a bare data set gets a preamble and a header that states the encoding its first bytes
-/// show.
-std::string withPreamble(const std::string& bytes) {
-  if (bytes.size() >= 132 && std::string_view(bytes).substr(128, 4) == "DICM") return {};
-  if (!beginsLikeDicom(bytes) || bytes[0] != 8) return {};
-  const auto upper = [&](std::size_t i) { return bytes[i] >= 'A' && bytes[i] <= 'Z'; };
-  std::string syntax = upper(4) && upper(5) ? "1.2.840.10008.1.2.1" : "1.2.840.10008.1.2";
-  if (syntax.size() % 2 != 0) syntax.push_back('\0');
-  std::string out(128, '\0');
-  out += "DICM";
-  const auto length = static_cast<char>(8 + syntax.size());
-  out += std::string("\x02\0\0\0UL\x04\0", 8) + std::string{length, 0, 0, 0};
-  out += std::string("\x02\0\x10\0UI", 6) + std::string{static_cast<char>(syntax.size()), 0} + syntax;
-  return out + bytes;
-}
-
+/// True when the parser is content and was given everything it asked for.
 template <class Reader, class Read>
-bool readGuarded(Reader& reader, const std::string& bytes, const Read& read) {
-  const std::string wrapped = withPreamble(bytes);
-  MemoryBuffer buffer(wrapped.empty() ? bytes : wrapped);
+Result<bool> readGuarded(Reader& reader, const InputFile& input, const Read& read) {
+  if (!beginsLikeDicom(input.bytes)) return fail(ErrorCode::Corrupt, input.name + ": not a DICOM file");
+  const auto rewritten = asPart10(input.bytes, input.name);
+  if (!rewritten) return tl::unexpected(rewritten.error());
+  MemoryBuffer buffer(rewritten->empty() ? input.bytes : *rewritten);
   std::istream stream(&buffer);
   reader.SetStream(stream);
+  bool good = false;
   try {
-    return read(reader);
+    good = read(reader);
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception&) {
-    return false;
+    good = false;
   }
+  if (buffer.ranShort())
+    return fail(ErrorCode::Corrupt, input.name + ": truncated, or a value is longer than the file");
+  return good;
 }
 
 struct KnownClass {
@@ -117,7 +97,7 @@ void classify(const gdcm::DataSet& set, const std::string& media_class, Identity
   const bool is_ct = identity.kind == ObjectKind::CtImage || identity.kind == ObjectKind::MultiFrameCt;
   if (is_ct && modality != "CT") {
     identity.kind = ObjectKind::OtherImage;
-    identity.what = modality == "MR" ? "of modality MR" : "of a modality other than CT";
+    identity.what = "an object of another modality";
   }
 }
 
@@ -127,7 +107,6 @@ bool isLossy(const gdcm::File& file) {
 }
 
 Error unreadable(const InputFile& input, const gdcm::File& file) {
-  if (!beginsLikeDicom(input.bytes)) return {ErrorCode::Corrupt, input.name + ": not a DICOM file"};
   const std::string syntax = textAt(file.GetHeader(), {0x0002, 0x0010});
   if (!syntax.empty() && gdcm::TransferSyntax::GetTSType(syntax.c_str()) == gdcm::TransferSyntax::TS_END) {
     return {ErrorCode::Unsupported, input.name + ": its transfer syntax is unknown"};
@@ -157,9 +136,10 @@ Result<void> checkLength(const InputFile& input, const gdcm::File& file, std::si
 
 Result<ParsedHeader> parseHeader(const InputFile& input, std::size_t index) {
   gdcm::Reader reader;
-  const bool good =
-      readGuarded(reader, input.bytes, [](gdcm::Reader& r) { return r.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010)); });
-  if (!good) return tl::unexpected(unreadable(input, reader.GetFile()));
+  const auto good =
+      readGuarded(reader, input, [](gdcm::Reader& r) { return r.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010)); });
+  if (!good) return tl::unexpected(good.error());
+  if (!*good) return tl::unexpected(unreadable(input, reader.GetFile()));
   ParsedHeader header;
   header.file = &reader.GetFile();
   const gdcm::DataSet& set = header.file->GetDataSet();
@@ -172,9 +152,12 @@ Result<ParsedHeader> parseHeader(const InputFile& input, std::size_t index) {
   return header;
 }
 
-Result<std::vector<char>> decodePixels(const InputFile& input, const StoredPixels& pixels, std::size_t frames) {
-  gdcm::ImageReader reader;
-  if (!readGuarded(reader, input.bytes, [](gdcm::ImageReader& r) { return r.Read(); })) {
+Result<std::vector<char>> decodePixels(const InputFile& input, const StoredPixels& pixels, std::size_t frames,
+                                       bool multi_frame) {
+  PixelReader reader;
+  const auto good = readGuarded(reader, input, [&](PixelReader& r) { return r.readPixels(multi_frame); });
+  if (!good) return tl::unexpected(good.error());
+  if (!*good) {
     return fail(ErrorCode::Corrupt, input.name + ": its image cannot be read");
   }
   const gdcm::Image& image = reader.GetImage();

@@ -41,6 +41,6 @@ struct ParsedHeader {
 /// The stored cells of all frames, as the header of `first` describes them.
 /// @error Corrupt: short, long or undecodable pixel data.
 [[nodiscard]] Result<std::vector<char>> decodePixels(const InputFile& input, const StoredPixels& pixels,
-                                                     std::size_t frames);
+                                                     std::size_t frames, bool multi_frame);
 
 }  // namespace spinaltap::importer

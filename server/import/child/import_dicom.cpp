@@ -97,7 +97,8 @@ Result<std::vector<Slice>> allSlices(const Headers& headers, std::uint64_t voxel
 /// Decodes each file when its first slice is due and drops it after its last.
 class PixelFeed {
  public:
-  PixelFeed(Input& input, const std::vector<Slice>& slices) : input_(input), left_(input.files.size()) {
+  PixelFeed(Input& input, const std::vector<Slice>& slices, bool multi_frame)
+      : input_(input), multi_frame_(multi_frame), left_(input.files.size()) {
     for (const Slice& slice : slices) ++left_[slice.file];
     frames_ = left_;
   }
@@ -105,7 +106,7 @@ class PixelFeed {
   Result<std::vector<std::int16_t>> hu(const Slice& slice, std::size_t& padded) {
     InputFile& file = input_.files[slice.file];
     if (held_ != &file) {
-      auto cells = decodePixels(file, slice.pixels, frames_[slice.file]);
+      auto cells = decodePixels(file, slice.pixels, frames_[slice.file], multi_frame_);
       if (!cells) return tl::unexpected(cells.error());
       cells_ = std::move(*cells);
       held_ = &file;
@@ -119,13 +120,15 @@ class PixelFeed {
 
  private:
   Input& input_;
+  bool multi_frame_;
   std::vector<std::size_t> left_, frames_;
   const InputFile* held_ = nullptr;
   std::vector<char> cells_;
 };
 
-Result<void> sendPixels(Input& input, const std::vector<Slice>& slices, const Stack& stack, Output& output) {
-  PixelFeed feed(input, slices);
+Result<void> sendPixels(Input& input, const std::vector<Slice>& slices, const Stack& stack, bool multi_frame,
+                        Output& output) {
+  PixelFeed feed(input, slices, multi_frame);
   std::size_t padded = 0;
   for (std::size_t k = 0; k < stack.order.size(); ++k) {
     const Slice& slice = slices[stack.order[k]];
@@ -170,7 +173,7 @@ Result<void> importDicom(Input& input, const ImportRequest& request, Output& out
   headers->clear();
   output.accepted(
       {frames ? SourceKind::DicomMultiFrame : SourceKind::DicomSlices, stack->grid, request.label.has_value()});
-  if (auto sent = sendPixels(input, *slices, *stack, output); !sent) return sent;
+  if (auto sent = sendPixels(input, *slices, *stack, frames, output); !sent) return sent;
   output.label(inside);
   for (const std::string& note : notes) output.note(note);
   return {};

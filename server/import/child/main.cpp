@@ -50,9 +50,9 @@ int runToEnd() {
   try {
     done = run(output);
   } catch (const std::bad_alloc&) {
-    done = fail(ErrorCode::Limit, "the input asks for more memory than its size allows");
+    done = fail(ErrorCode::Limit, fileInWork() + ": asks for more memory than its size allows");
   } catch (const std::exception&) {
-    done = fail(ErrorCode::Corrupt, "the input is broken in a way its parser did not expect");
+    done = fail(ErrorCode::Corrupt, fileInWork() + ": broken in a way its parser did not expect");
   }
   if (done) {
     output.end();

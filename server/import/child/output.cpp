@@ -20,6 +20,8 @@ void writeAll(int fd, std::span<const std::byte> bytes) {
   }
 }
 
+std::string last_file;
+
 }  // namespace
 
 void Output::frame(FrameType type, std::span<const std::byte> payload) {
@@ -71,11 +73,14 @@ void Output::refused(const Error& error) {
 void Output::end() { frame(FrameType::End, {}); }
 
 void reportProgress(std::string_view stage, std::size_t done, std::size_t total, std::string_view file) {
+  if (!file.empty()) last_file = oneLine(file, 120);
   std::string line =
       "{\"stage\":\"" + oneLine(stage) + "\",\"done\":" + std::to_string(done) + ",\"total\":" + std::to_string(total);
-  if (!file.empty()) line += ",\"file\":\"" + oneLine(file, 120) + "\"";
+  if (!file.empty()) line += ",\"file\":\"" + last_file + "\"";
   line += "}\n";
   writeAll(kProgressDescriptor, std::as_bytes(std::span(line)));
 }
+
+std::string fileInWork() { return last_file.empty() ? "the input" : last_file; }
 
 }  // namespace spinaltap::importer

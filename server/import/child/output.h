@@ -27,5 +27,7 @@ class Output {
 
 /// Progress on descriptor 3. `file` is what the parser is given next; a crash is blamed on it.
 void reportProgress(std::string_view stage, std::size_t done, std::size_t total, std::string_view file = {});
+/// The last one reported, for errors that come from below the parser.
+[[nodiscard]] std::string fileInWork();
 
 }  // namespace spinaltap::importer
