@@ -49,7 +49,7 @@ Section section(const Anatomy& an, const Vec3& p) {
   const double flat = 1.0 / (1.0 + p.x * p.x / 2500.0);  // far to the side the bend would only steepen the field
   const double v = (p.y - an.kidney * (p.x * p.x * flat - 130.0)) / b;
   // Between an ellipse (2) and a squarer oval (0); squarer at the back.
-  const double c = 0.95 - 0.35 * v / std::sqrt(1.0 + v * v);
+  const double c = 0.8 - 0.55 * v / std::sqrt(1.0 + v * v);
   const double u2 = u * u, v2 = v * v;
   const double n4 = u2 * u2 + c * u2 * v2 + v2 * v2;
   const double n = std::sqrt(std::sqrt(n4 + 1e-12));
@@ -183,7 +183,7 @@ Anatomy Anatomy::make(std::uint64_t seed) {
   Anatomy an;
   const auto vary = [&random](double& value, double part) { value *= random.uniform(1.0 - part, 1.0 + part); };
   vary(an.rim_half_width, 0.03);
-  an.waist_half_width = an.rim_half_width * random.uniform(0.85, 0.88);
+  an.waist_half_width = an.rim_half_width * random.uniform(0.83, 0.86);
   vary(an.rim_half_depth, 0.03);
   an.waist_half_depth = an.rim_half_depth * random.uniform(0.905, 0.93);
   vary(an.half_height, 0.025);

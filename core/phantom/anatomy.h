@@ -9,13 +9,13 @@ namespace spinaltap::phantom {
 
 /// Dimensions in mm and radians. The defaults are a middling adult L3; make() varies them.
 struct Anatomy {
-  double rim_half_width = 24.3, waist_half_width = 20.9;  ///< body, side to side
+  double rim_half_width = 24.3, waist_half_width = 20.5;  ///< body, side to side
   double rim_half_depth = 17.0, waist_half_depth = 15.6;  ///< body, front to back
   double half_height = 14.3;                              ///< body, at the rims
   double wedge = 0.025;                                   ///< front minus back height, per mm of depth and endplate
   double endplate_dish = 2.2;                             ///< depth of the endplates' concavity
-  double kidney = 0.0120;                                 ///< how far the section is bent backwards, per mm^2 of x
-  double pedicle_half_width = 4.6, pedicle_half_height = 7.3;
+  double kidney = 0.0140;                                 ///< how far the section is bent backwards, per mm^2 of x
+  double pedicle_half_width = 4.6, pedicle_half_height = 6.8;
   double pedicle_angle = 0.21;  ///< medially towards the front, in the transverse plane
   double canal_half_width = 11.4, canal_apex_y = 33.0;
   double transverse_span = 46.0;  ///< midline to tip

@@ -45,8 +45,7 @@ std::vector<float> sliceProfile(double thickness, double step) {
 
 class Sampler {
  public:
-  Sampler(const Phantom& phantom, const volume::Grid& grid)
-      : phantom_(phantom), grid_(grid), nx_(grid.dims[0]), ny_(grid.dims[1]) {
+  Sampler(const Phantom& phantom, const volume::Grid& grid) : phantom_(phantom), nx_(grid.dims[0]), ny_(grid.dims[1]) {
     const Frame& frame = phantom.frame();
     origin_ = frame.toLocal(grid.origin_patient);
     di_ = frame.directionToLocal(grid.direction.col_x) * grid.spacing_mm.x;
@@ -151,7 +150,6 @@ class Sampler {
   }
 
   const Phantom& phantom_;
-  const volume::Grid& grid_;
   int nx_, ny_;
   Vec3 origin_, di_, dj_, dk_;  // the grid in the vertebra's frame
   Image low_plane_, high_plane_;
@@ -184,9 +182,9 @@ void spread(Image& image, const CtOptions& options, Image& scratch) {
 }
 
 /// White noise smoothed by [1 2 1] / 4 both ways, whose standard deviation is 6/16 of the white one's.
-void addNoise(Image& image, const CtOptions& options, int k, Image& noise, Image& scratch) {
+void addNoise(Image& image, const CtOptions& options, std::uint64_t phantom_seed, int k, Image& noise, Image& scratch) {
   if (options.noise_hu <= 0) return;
-  Random random(combine(options.seed, static_cast<std::uint64_t>(k)));
+  Random random(combine(combine(options.seed, phantom_seed), static_cast<std::uint64_t>(k)));
   const double white = options.noise_hu * 16.0 / 6.0;
   for (float& value : noise) value = static_cast<float>(white * random.gaussian());
   smear(noise, options.dims[0], options.dims[1], 0.25f, scratch);
@@ -247,7 +245,7 @@ Result<volume::CtVolume> sampleCt(const Phantom& phantom, const CtOptions& optio
       for (std::size_t p = 0; p < pixels; ++p) image[p] += profile[static_cast<std::size_t>(n)] * layer[p];
     }
     spread(image, options, scratch);
-    addNoise(image, options, k, noise, scratch);
+    addNoise(image, options, phantom.options().seed, k, noise, scratch);
     std::transform(image.begin(), image.end(),
                    ct.hu.begin() + static_cast<std::ptrdiff_t>(pixels * static_cast<std::size_t>(k)), stored);
     if (progress) progress(static_cast<double>(k + 1) / options.dims[2]);

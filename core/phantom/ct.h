@@ -18,7 +18,7 @@ struct CtOptions {
   double thickness_mm = 1.1;  ///< of a slice: the width of its box profile along z
   double psf_fwhm_mm = 0.5;   ///< in-plane point spread, full width at half maximum, close to a Gaussian
   double noise_hu = 20;       ///< standard deviation, correlated between neighbours in the plane
-  std::uint64_t seed = 1;     ///< of the noise
+  std::uint64_t seed = 1;     ///< of the noise, together with the phantom's own
 
   /// The same field of view with `factor` times wider voxels in the plane and along z, for quick tests.
   /// @pre factor >= 1.

@@ -55,9 +55,9 @@ double Tissue::boneHu(const Anatomy& anatomy, const Vec3& local, double depth_mm
   const double arch = smoothStep(14.0, 21.0, local.y);
   const double shell = shellThickness(local);
   const double inside = smoothStep(shell - 0.2, shell + 0.2, depth_mm);
-  const double dense = std::max(0.8 * arch, smoothStep(0.35, 1.0, std::fabs(local.z) / anatomy.half_height));
+  const double dense = std::max(0.8 * arch, smoothStep(0.25, 0.9, std::fabs(local.z) / anatomy.half_height));
   const double grain = inside > 0 ? 0.65 * noise(seed + 2, local, 1.7) + 0.35 * noise(seed + 3, local, 5.0) : 0.0;
-  const double cancellous = osteoporotic ? mixed(68, 80, dense) + 11 * grain : mixed(160, 205, dense) + 27 * grain;
+  const double cancellous = osteoporotic ? mixed(68, 80, dense) + 11 * grain : mixed(160, 205, dense) + 30 * grain;
   const double cortical =
       mixed(osteoporotic ? 700 : 820, osteoporotic ? 900 : 1080, arch) + 90 * noise(seed + 4, local, 6.0);
   const double low = osteoporotic ? 60 : 140, high = osteoporotic ? 90 : 230;
