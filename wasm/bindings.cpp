@@ -85,6 +85,16 @@ std::uint64_t wholeOf(double number) {
   return static_cast<std::uint64_t>(number < kMost ? number : kMost);
 }
 
+val aliveBitsOf(const point_volume::PointVolume& volume) {
+  std::vector<std::uint32_t> words;
+  words.reserve(2 * volume.alive.size());
+  for (const std::uint64_t word : volume.alive) {
+    words.push_back(static_cast<std::uint32_t>(word));
+    words.push_back(static_cast<std::uint32_t>(word >> 32));
+  }
+  return arrayOf("Uint32Array", words);
+}
+
 val floatsOf(const std::vector<splats::Splat>& splats) {
   std::vector<float> floats;
   floats.reserve(7 * splats.size());

@@ -86,6 +86,8 @@ class PlayerBinding {
 
   [[nodiscard]] val splats() const { return floatsOf(splats::scan(player_.volume(), player_.before())); }
 
+  [[nodiscard]] val aliveBits() const { return aliveBitsOf(player_.volume()); }
+
   [[nodiscard]] val verify() const {
     const recording::ReplayReport& report = player_.report();
     val result = val::object();
@@ -126,6 +128,7 @@ void bindPlayer() {
       .function("poseAt", &PlayerBinding::poseAt)
       .function("series", &PlayerBinding::series)
       .function("splats", &PlayerBinding::splats)
+      .function("aliveBits", &PlayerBinding::aliveBits)
       .function("verify", &PlayerBinding::verify);
 }
 

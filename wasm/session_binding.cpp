@@ -85,10 +85,11 @@ Result<std::unique_ptr<SessionBinding>> fromBytes(const val& bytes_array, const 
   return SessionBinding::create(std::move(*volume), *settings);
 }
 
-/// JSON.parse, before anything is held: it throws its own one-line SyntaxError.
 SessionBinding* make(const val& bytes, const std::string& config_json) {
-  return orThrow<std::unique_ptr<SessionBinding>>(
-             [&] { return fromBytes(bytes, val::global("JSON").call<val>("parse", config_json)); })
+  return orThrow<std::unique_ptr<SessionBinding>>([&]() -> Result<std::unique_ptr<SessionBinding>> {
+           if (spinaltapParse(config_json.c_str()) == 0) return fail(ErrorCode::InvalidArgument, "config: not JSON");
+           return fromBytes(bytes, val::module_property("parsedConfig"));
+         })
       .release();
 }
 
@@ -138,6 +139,8 @@ std::string SessionBinding::stateHash() const { return hexOf(session_.stateHash(
 double SessionBinding::points() const { return static_cast<double>(session_.volume().lattice.points()); }
 double SessionBinding::pointsAlive() const { return static_cast<double>(countAlive(session_.volume())); }
 
+val SessionBinding::aliveBits() const { return aliveBitsOf(session_.volume()); }
+
 val SessionBinding::takeSplats() {
   const std::vector<splats::Splat> taken = tracker_.takeExposed(session_.volume());
   taken_indices_.clear();
@@ -182,6 +185,7 @@ void bindSession() {
       .function("stateHash", &SessionBinding::stateHash)
       .function("points", &SessionBinding::points)
       .function("pointsAlive", &SessionBinding::pointsAlive)
+      .function("aliveBits", &SessionBinding::aliveBits)
       .function("takeSplats", &SessionBinding::takeSplats)
       .function("takeSplatIndices", &SessionBinding::takeSplatIndices)
       .function("takeHidden", &SessionBinding::takeHidden)

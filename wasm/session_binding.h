@@ -32,6 +32,7 @@ class SessionBinding {
   [[nodiscard]] std::string stateHash() const;
   [[nodiscard]] double points() const;
   [[nodiscard]] double pointsAlive() const;
+  [[nodiscard]] emscripten::val aliveBits() const;
   emscripten::val takeSplats();
   [[nodiscard]] emscripten::val takeSplatIndices() const;
   emscripten::val takeHidden();
@@ -53,6 +54,9 @@ class SessionBinding {
 
 void bindSession();
 void bindPlayer();
+
+/// Bit (index & 31) of word (index >> 5), as a Uint32Array.
+[[nodiscard]] emscripten::val aliveBitsOf(const point_volume::PointVolume& volume);
 
 /// Seven floats a splat.
 [[nodiscard]] emscripten::val floatsOf(const std::vector<splats::Splat>& splats);
