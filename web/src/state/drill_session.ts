@@ -1,0 +1,110 @@
+// One drill as the room sees it: signals that the worker's messages move.
+import { signal } from "@preact/signals";
+import type { Vec3 } from "../contract/bodies";
+import type { PathInfo } from "../contract/rest";
+import type { Readings } from "../worker/drill_loop";
+import type { FromWorker, SplatChange } from "../worker/messages";
+import type { Steering } from "../worker/motion";
+import type { Agreement } from "../worker/server_link";
+import { ApiError, createSession, socketUrl } from "./api";
+import { CoreClient } from "./core_client";
+import { messageOf } from "./load";
+
+export type Phase = "opening" | "drilling" | "finishing" | "finished" | "failed";
+
+export interface Outcome {
+  recording_id: string | null;
+  metrics_json: string | null;
+  recording: Uint8Array;
+}
+
+export class DrillSession {
+  readonly phase = signal<Phase>("opening");
+  readonly readings = signal<Readings | null>(null);
+  readonly agreement = signal<Agreement>({ kind: "connecting" });
+  readonly trouble = signal<string | null>(null);
+  readonly outcome = signal<Outcome | null>(null);
+  /** Depth, thrust, depth, thrust ... ; the version counts its changes. */
+  readonly trace: number[] = [];
+  readonly trace_version = signal(0);
+  onSplats: ((change: SplatChange) => void) | null = null;
+  /** Which points are left, a few times a second while watched. */
+  onAlive: ((alive: Uint32Array) => void) | null = null;
+  private readonly core = new CoreClient((message) => this.hear(message));
+
+  /** Starts the server's session, or goes on without it, and opens the core. */
+  async open(case_id: string, path: PathInfo, point_volume: Uint8Array): Promise<void> {
+    let socket_url: string | null = null;
+    let offline_reason = "";
+    let engine = "bounded";
+    try {
+      const session = await createSession(case_id, path.id);
+      socket_url = socketUrl(session.id);
+      engine = session.engine;
+    } catch (error) {
+      offline_reason = error instanceof ApiError ? error.message : messageOf(error);
+    }
+    const config = { bit: path.bit, engine, case_id, path_id: path.id, length_mm: path.length_mm };
+    this.core.tell({
+      type: "open_drill",
+      point_volume,
+      config_json: JSON.stringify(config),
+      lead_mm: path.lead_mm,
+      reach_mm: path.bit.length_mm,
+      socket_url,
+      offline_reason,
+    });
+  }
+
+  steer(steering: Steering): void {
+    this.core.tell({ type: "steer", steering });
+  }
+  nudge(displacement: Vec3): void {
+    this.core.tell({ type: "nudge", displacement });
+  }
+  watchAlive(on: boolean): void {
+    this.core.tell({ type: "watch_alive", on });
+  }
+  finish(): void {
+    if (this.phase.value !== "drilling") return;
+    this.phase.value = "finishing";
+    this.core.tell({ type: "finish_drill" });
+  }
+  close(): void {
+    this.core.close();
+  }
+
+  private hear(message: FromWorker): void {
+    switch (message.type) {
+      case "drill_open":
+        this.phase.value = "drilling";
+        break;
+      case "frame":
+        this.hearFrame(message);
+        break;
+      case "alive":
+        this.onAlive?.(message.alive);
+        break;
+      case "agreement":
+        this.agreement.value = message.agreement;
+        break;
+      case "drill_finished":
+        this.outcome.value = message;
+        this.phase.value = "finished";
+        this.core.close();
+        break;
+      case "failed":
+        this.trouble.value = message.message;
+        this.phase.value = "failed";
+        break;
+    }
+  }
+
+  private hearFrame(frame: Extract<FromWorker, { type: "frame" }>): void {
+    this.readings.value = frame.readings;
+    this.onSplats?.(frame.splats);
+    if (frame.trace.length === 0) return;
+    for (let i = 0; i < frame.trace.length; i += 3) this.trace.push(frame.trace[i]!, frame.trace[i + 1]!);
+    ++this.trace_version.value;
+  }
+}

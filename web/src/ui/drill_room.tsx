@@ -1,0 +1,312 @@
+// Drill: the hand pushes the bit, the core cuts, the server follows and the page says whether both agree.
+import { type Signal, useComputed, useSignal, useSignalEffect } from "@preact/signals";
+import { useEffect, useMemo, useRef } from "preact/hooks";
+import { type PointVolumeBody, pointVolume_mm3, type Vec3 } from "../contract/bodies";
+import type { PathInfo } from "../contract/rest";
+import { kBoneWindow, kPlanes } from "../geometry/slice";
+import { directionToPatient, toPatient } from "../geometry/vec";
+import type { VertebraScene } from "../scene/vertebra_scene";
+import { fetchPointVolume } from "../state/api";
+import { type CaseData, loadCase, pathOf } from "../state/case_data";
+import { DrillSession } from "../state/drill_session";
+import { useLoaded } from "../state/load";
+import { keepLocally, parseMetrics } from "../state/local_recordings";
+import { addressOf, kLocalRecording } from "../state/route";
+import { type Hand, type HandEvent, handAfter, kRestingHand, steeringOf } from "../state/steering";
+import { sliceMarks, Toggle } from "./case_room";
+import { Chart } from "./chart";
+import { DrillControls } from "./drill_controls";
+import { attachHand } from "./drill_input";
+import { MetricsTable } from "./metrics";
+import { caseCrumbs, Failure, Reading, TopBar, Waiting } from "./parts";
+import { SceneView } from "./scene_view";
+import { ServerBadge } from "./server_badge";
+import { SliceView } from "./slice_view";
+
+interface Opened {
+  data: CaseData;
+  path: PathInfo;
+  raw: Uint8Array;
+  body: PointVolumeBody;
+}
+
+async function open(case_id: string, path_id: string): Promise<Opened> {
+  const data = await loadCase(case_id);
+  const path = pathOf(data.detail, path_id);
+  if (!path) throw new Error(`This case has no path ${path_id}.`);
+  const { raw, body } = await fetchPointVolume(case_id, path_id);
+  return { data, path, raw, body };
+}
+
+export function DrillRoom({ case_id, path_id }: { case_id: string; path_id: string }) {
+  const attempt = useSignal(0);
+  const loaded = useLoaded(String(attempt.value), () => open(case_id, path_id)).value;
+  const label = loaded.state === "ready" ? loaded.value.data.detail.label : case_id;
+  const here = loaded.state === "ready" ? `Drill ${loaded.value.path.label || path_id}` : "Drill";
+  return (
+    <div class="page fixed">
+      <TopBar crumbs={caseCrumbs(case_id, label, here)} />
+      <main id="main" class="room" tabIndex={-1}>
+        {loaded.state === "loading" && <Waiting text="Fetching the modelled bone" />}
+        {loaded.state === "failed" && (
+          <Failure
+            title="This path cannot be drilled"
+            message={loaded.message}
+            retry={() => {
+              ++attempt.value;
+            }}
+          />
+        )}
+        {loaded.state === "ready" && <Drilling opened={loaded.value} />}
+      </main>
+    </div>
+  );
+}
+
+function Drilling({ opened }: { opened: Opened }) {
+  const { data, path } = opened;
+  const session = useMemo(() => new DrillSession(), []);
+  const hand = useSignal<Hand>(kRestingHand);
+  const tell = (event: HandEvent): void => {
+    hand.value = handAfter(hand.value, event);
+  };
+  useEffect(() => {
+    void session.open(data.detail.id, path, opened.raw);
+    return () => session.close();
+  }, []);
+  useSignalEffect(() => {
+    session.steer(steeringOf(hand.value));
+  });
+  useSignalEffect(() => {
+    const outcome = session.outcome.value;
+    if (outcome && outcome.recording_id === null) keepLocally(data.detail.id, outcome.recording);
+  });
+  return (
+    <div class="drill-room">
+      <DrillPicture opened={opened} session={session} hand={hand} tell={tell} />
+      <aside class="panel" aria-label="Readings and controls">
+        <h1 class="panel-title">{path.label || "Drill"}</h1>
+        <ServerBadge agreement={session.agreement} />
+        <Trouble session={session} />
+        <DrillReadings opened={opened} session={session} />
+        <ThrustChart session={session} path={path} />
+        {session.phase.value === "finished" ? (
+          <Finished session={session} case_id={data.detail.id} />
+        ) : (
+          <DrillControls hand={hand} tell={tell} session={session} />
+        )}
+      </aside>
+    </div>
+  );
+}
+
+function Trouble({ session }: { session: DrillSession }) {
+  if (!session.trouble.value) return null;
+  return (
+    <p class="trouble" role="alert">
+      The drill stopped: {session.trouble.value}
+    </p>
+  );
+}
+
+interface PictureProps {
+  opened: Opened;
+  session: DrillSession;
+  hand: Signal<Hand>;
+  tell: (event: HandEvent) => void;
+}
+
+function DrillPicture({ opened, session, hand, tell }: PictureProps) {
+  const { data, path, body } = opened;
+  const scene = useRef<VertebraScene | null>(null);
+  const glass = useSignal(false);
+  const cut_away = useSignal(false);
+  const ghost = useSignal(false);
+  useSignalEffect(() => scene.current?.setGlass(glass.value));
+  useSignalEffect(() => {
+    scene.current?.setCutAway(cut_away.value);
+    session.watchAlive(cut_away.value);
+  });
+  useSignalEffect(() => scene.current?.bit?.setGhost(ghost.value));
+  useSignalEffect(() => {
+    const readings = session.readings.value;
+    if (!readings || !scene.current) return;
+    scene.current.setBit(readings.tip, readings.axis);
+    scene.current.spin = readings.spinning && session.phase.value === "drilling" ? 14 : 0;
+  });
+  const ready = (made: VertebraScene): (() => void) => {
+    scene.current = made;
+    made.setGuides(null);
+    made.showPaths([path], path);
+    made.openPointVolume(body);
+    made.lookAtEntry();
+    session.onSplats = (change) => made.change(change);
+    session.onAlive = (alive) => made.setAlive(alive);
+    const detach = attachHand(made, { hand, tell, nudge: (by) => session.nudge(by) });
+    return () => {
+      detach();
+      session.onSplats = null;
+      session.onAlive = null;
+      scene.current = null;
+    };
+  };
+  return (
+    <div class="drill-picture">
+      <SceneView data={data} label="The bit in the vertebra" onReady={ready}>
+        <div class="scene-tools">
+          <button type="button" onClick={() => scene.current?.lookAtEntry()}>
+            Entry
+          </button>
+          <button
+            type="button"
+            onClick={() => {
+              ghost.value = true;
+              scene.current?.lookAlongBit();
+            }}
+          >
+            Along the bit
+          </button>
+          <button
+            type="button"
+            aria-pressed={cut_away.value}
+            onClick={() => {
+              cut_away.value = !cut_away.value;
+              if (cut_away.value) scene.current?.lookAcrossPath();
+            }}
+          >
+            Cut-away
+          </button>
+          <Toggle text="Glass bone" on={glass} />
+          <Toggle text="Ghost bit" on={ghost} />
+        </div>
+        <OutsideNote session={session} path={path} />
+      </SceneView>
+      <TipSlices data={data} path={path} session={session} />
+    </div>
+  );
+}
+
+/** The three slices through the tip, a few times a second. */
+function TipSlices({ data, path, session }: { data: CaseData; path: PathInfo; session: DrillSession }) {
+  const point = useSignal<Vec3>(path.entry_patient);
+  const pose = useSignal<{ tip: Vec3; axis: Vec3 } | null>(null);
+  useEffect(() => {
+    let shown = "";
+    const timer = setInterval(() => {
+      const readings = session.readings.peek();
+      if (!readings) return;
+      const key = [...readings.tip, ...readings.axis].map((v) => v.toFixed(2)).join();
+      if (key === shown) return;
+      shown = key;
+      point.value = toPatient(path.frame, readings.tip);
+      pose.value = { tip: point.value, axis: directionToPatient(path.frame, readings.axis) };
+    }, 120);
+    return () => clearInterval(timer);
+  }, [session, path, point, pose]);
+  const { marks, lines } = sliceMarks([path], path, pose.value);
+  return (
+    <div class="tip-slices">
+      {kPlanes.map((plane) => (
+        <SliceView
+          key={plane}
+          volume={data.volume!}
+          plane={plane}
+          point={point}
+          window={kBoneWindow}
+          marks={marks}
+          lines={lines}
+          follows
+          reach_mm={26}
+        />
+      ))}
+    </div>
+  );
+}
+
+/** Beyond the modelled cylinder there are no points to cut: say so, rather than pass through bone in silence. */
+function OutsideNote({ session, path }: { session: DrillSession; path: PathInfo }) {
+  const outside = useComputed(() => {
+    const readings = session.readings.value;
+    if (!readings || readings.depth_mm < 0) return false;
+    const limit = path.volume_radius_mm - path.bit.diameter_mm / 2;
+    return Math.hypot(readings.tip[0], readings.tip[1]) > limit + 1e-6;
+  });
+  if (!outside.value) return null;
+  return (
+    <p class="scene-note" role="status">
+      The bit has left the modelled bone around the path; what it touches there is not cut.
+    </p>
+  );
+}
+
+function DrillReadings({ opened, session }: { opened: Opened; session: DrillSession }) {
+  const readings = session.readings.value;
+  const volume = pointVolume_mm3(opened.body.lattice);
+  const past = (readings?.depth_mm ?? 0) - opened.path.length_mm;
+  return (
+    <dl class="readings">
+      <Reading name="Depth" value={(readings?.depth_mm ?? 0).toFixed(2)} unit="mm" hot={past > 0.5} />
+      <Reading name="Thrust" value={(readings?.thrust_N ?? 0).toFixed(2)} unit="N" />
+      <Reading name="Bone removed" value={((readings?.removed ?? 0) * volume).toFixed(1)} unit="mm³" />
+      <Reading name="Cycles" value={rateText(readings?.rate_hz ?? 0)} unit="a second" />
+      <p class="reading-note">
+        {past > 0.5
+          ? `${past.toFixed(1)} mm past the target`
+          : `Target at ${opened.path.length_mm.toFixed(1)} mm · ${(readings?.cycle ?? 0).toLocaleString("en")} cycles`}
+      </p>
+    </dl>
+  );
+}
+
+function rateText(hz: number): string {
+  return hz < 1 ? "idle" : Math.round(hz).toLocaleString("en");
+}
+
+function ThrustChart({ session, path }: { session: DrillSession; path: PathInfo }) {
+  const readings = session.readings.value;
+  const cursor: [number, number] | null = readings ? [readings.depth_mm, readings.thrust_N] : null;
+  const low = -Math.ceil(path.lead_mm + 6);
+  return (
+    <Chart
+      series={{ points: session.trace }}
+      version={session.trace_version.value}
+      x={{ name: "depth", unit: "mm", low, high: Math.ceil(path.length_mm + 6) }}
+      y={{ name: "thrust", unit: "N", least_high: 4 }}
+      rules={[
+        { at: 0, name: "entry", colour: "#5fe08a" },
+        { at: path.length_mm, name: "target", colour: "#f2a541" },
+      ]}
+      cursor={cursor}
+      label="Thrust over depth"
+    />
+  );
+}
+
+function Finished({ session, case_id }: { session: DrillSession; case_id: string }) {
+  const outcome = session.outcome.value!;
+  const metrics = parseMetrics(outcome.metrics_json);
+  const id = outcome.recording_id ?? kLocalRecording;
+  return (
+    <section class="finished" aria-label="The finished drill">
+      <h2>Finished</h2>
+      {outcome.recording_id === null ? (
+        <p class="dim">
+          The server has not kept this drill. It can be replayed here until the page is closed.
+        </p>
+      ) : (
+        <p class="dim">
+          Kept as recording <code>{outcome.recording_id}</code>.
+        </p>
+      )}
+      {metrics && <MetricsTable metrics={metrics} />}
+      <div class="row">
+        <a class="button primary" href={addressOf({ room: "replay", case_id, recording_id: id })}>
+          Replay
+        </a>
+        <a class="button" href={addressOf({ room: "case", case_id, path_id: null })}>
+          Back to the case
+        </a>
+      </div>
+    </section>
+  );
+}

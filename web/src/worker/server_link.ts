@@ -1,0 +1,119 @@
+// The line to the server's session: sends batches, compares the server's state hash with ours at the same cycle.
+import { decodeServerMessage, encodeClientMessage } from "../contract/drill_messages";
+import type { Batch } from "./drill_loop";
+
+export type Agreement =
+  | { kind: "connecting" }
+  | { kind: "agrees"; cycle: number; behind: number }
+  | { kind: "differs"; cycle: number }
+  | { kind: "offline"; reason: string };
+
+export interface LinkEvents {
+  agreement(agreement: Agreement): void;
+  finished(recording_id: string, metrics_json: string): void;
+}
+
+/** What a WebSocket is used for here; a test gives its own. */
+export interface Wire {
+  send(bytes: Uint8Array<ArrayBuffer>): void;
+  close(): void;
+}
+
+export class ServerLink {
+  private expected = new Map<number, { cycle: number; hash: string }>();
+  private sent_cycle = 0;
+  private state: Agreement = { kind: "connecting" };
+  private waiting: Uint8Array<ArrayBuffer>[] = [];
+  private welcomed = false;
+  private over = false;
+
+  constructor(
+    private readonly wire: Wire,
+    private readonly start_hash: string,
+    private readonly events: LinkEvents,
+  ) {}
+
+  opened(): void {
+    this.wire.send(encodeClientMessage({ type: "hello", max_rate_hz: 0 }));
+  }
+
+  send(batch: Batch): void {
+    if (this.state.kind === "offline" || this.over) return;
+    this.expected.set(batch.first_seq + batch.poses.length - 1, { cycle: batch.cycle, hash: batch.hash });
+    this.sent_cycle = batch.cycle;
+    this.post(encodeClientMessage({ type: "poses", first_seq: batch.first_seq, poses: batch.poses }));
+  }
+
+  finish(): void {
+    if (this.state.kind !== "offline") this.post(encodeClientMessage({ type: "finish" }));
+  }
+
+  received(bytes: Uint8Array): void {
+    try {
+      this.handle(bytes);
+    } catch (error) {
+      this.drop(`the server's answer was not understood: ${(error as Error).message}`);
+      this.wire.close();
+    }
+  }
+
+  /** The line broke or never opened. */
+  lost(reason: string): void {
+    if (!this.over) this.drop(reason);
+  }
+
+  get offline(): boolean {
+    return this.state.kind === "offline";
+  }
+
+  private post(bytes: Uint8Array<ArrayBuffer>): void {
+    if (this.welcomed) this.wire.send(bytes);
+    else this.waiting.push(bytes);
+  }
+
+  private handle(bytes: Uint8Array): void {
+    const message = decodeServerMessage(bytes);
+    switch (message.type) {
+      case "welcome":
+        this.welcomed = true;
+        this.compare(message.state_hash, { cycle: 0, hash: this.start_hash });
+        for (const held of this.waiting) this.wire.send(held);
+        this.waiting = [];
+        break;
+      case "feedback": {
+        const ours = this.expected.get(message.seq);
+        if (!ours) break;
+        for (const seq of this.expected.keys()) if (seq <= message.seq) this.expected.delete(seq);
+        if (message.cycle === ours.cycle) this.compare(message.state_hash, ours);
+        else this.say({ kind: "differs", cycle: Math.min(message.cycle, ours.cycle) });
+        break;
+      }
+      case "finished":
+        this.over = true;
+        this.events.finished(message.recording_id, message.metrics_json);
+        break;
+      case "refused":
+        this.drop(`the server refused: ${message.reason}`);
+        break;
+    }
+  }
+
+  private compare(theirs: string, ours: { cycle: number; hash: string }): void {
+    // Once they differ they cannot agree again: keep the first cycle at which it was seen.
+    if (this.state.kind === "differs") return;
+    if (theirs === ours.hash)
+      this.say({ kind: "agrees", cycle: ours.cycle, behind: this.sent_cycle - ours.cycle });
+    else this.say({ kind: "differs", cycle: ours.cycle });
+  }
+
+  private drop(reason: string): void {
+    this.say({ kind: "offline", reason });
+    this.expected.clear();
+    this.waiting = [];
+  }
+
+  private say(agreement: Agreement): void {
+    this.state = agreement;
+    this.events.agreement(agreement);
+  }
+}
