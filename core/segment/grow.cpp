@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/segment/distance.h"
 #include "core/segment/flood.h"
@@ -17,6 +17,8 @@ using volume::CtVolume;
 using volume::Grid;
 using volume::LabelVolume;
 using volume::VoxelBox;
+
+constexpr double kLeastIsland_mm3 = 500;  // a hundredth of a vertebra
 
 double axisOf(const Vec3& v, std::size_t axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
@@ -88,39 +90,49 @@ Result<Region> regionOf(const CtVolume& ct, const GrowOptions& o) {
   return region;
 }
 
-/// The set voxel nearest to a place (continuous voxel coordinates of the mask), within reach.
-std::optional<std::size_t> nearestSet(const Mask& mask, const Vec3& at, double reach_mm) {
-  const VoxelBox near = [&] {
-    VoxelBox b;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const double reach = reach_mm / axisOf(mask.spacing_mm, a) + 0.5;
-      const double last = mask.dims[a] - 1;
-      b.low[a] = static_cast<int>(std::clamp(std::floor(axisOf(at, a) - reach), 0.0, last));
-      b.high[a] = static_cast<int>(std::clamp(std::ceil(axisOf(at, a) + reach), 0.0, last));
-    }
-    return b;
-  }();
-  std::optional<std::size_t> best;
-  // The voxel that holds the seed counts even when its centre is farther than a tiny reach.
-  const double half_diagonal = 0.5 * norm(mask.spacing_mm);
-  double least = std::max(reach_mm, half_diagonal);
+/// The set voxels within reach of a place (continuous voxel coordinates of the mask), nearest first. The voxel that
+/// holds the place counts even when the reach is tiny.
+std::vector<std::size_t> setVoxelsNear(const Mask& mask, const Vec3& at, double reach_mm) {
+  const double longest = std::max(reach_mm, 0.5 * norm(mask.spacing_mm));
+  VoxelBox near;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double reach = longest / axisOf(mask.spacing_mm, a);
+    const double last = mask.dims[a] - 1;
+    near.low[a] = static_cast<int>(std::clamp(std::floor(axisOf(at, a) - reach), 0.0, last));
+    near.high[a] = static_cast<int>(std::clamp(std::ceil(axisOf(at, a) + reach), 0.0, last));
+  }
+  std::vector<std::pair<double, std::size_t>> found;
   for (int k = near.low[2]; k <= near.high[2]; ++k) {
     for (int j = near.low[1]; j <= near.high[1]; ++j) {
       for (int i = near.low[0]; i <= near.high[0]; ++i) {
         if (mask.set[mask.index(i, j, k)] == 0) continue;
         const double d =
             norm({(i - at.x) * mask.spacing_mm.x, (j - at.y) * mask.spacing_mm.y, (k - at.z) * mask.spacing_mm.z});
-        if (d <= least) least = d, best = mask.index(i, j, k);
+        if (d <= longest) found.emplace_back(d, mask.index(i, j, k));
       }
     }
   }
-  return best;
+  std::sort(found.begin(), found.end());
+  std::vector<std::size_t> out;
+  for (const auto& [distance, voxel] : found) out.push_back(voxel);
+  return out;
+}
+
+/// Noise makes specks in marrow that is darker than the threshold: they are passed over on the way to the shell.
+std::vector<std::size_t> islandNear(Mask& bone, const Vec3& seed, double reach_mm, std::size_t least,
+                                    std::size_t most) {
+  for (const std::size_t start : setVoxelsNear(bone, seed, reach_mm)) {
+    if (bone.set[start] == 0) continue;  // of a speck taken before
+    std::vector<std::size_t> island = takeConnected(bone, start, most);
+    if (island.size() >= least) return island;
+  }
+  return {};
 }
 
 Error noBoneAtSeed(const CtVolume& ct, const GrowOptions& o) {
   const auto whole = [](double hu) { return std::to_string(static_cast<long>(std::lround(hu))); };
   return {ErrorCode::NotFound, "no bone at the seed: " + whole(volume::sampleHu(ct, o.seed_patient)) +
-                                   " HU there, and nothing of " + whole(o.threshold_hu) + " HU or more within " +
+                                   " HU there, and no bone of " + whole(o.threshold_hu) + " HU or more within " +
                                    whole(o.seed_reach_mm) + " mm"};
 }
 
@@ -175,9 +187,8 @@ void fillMarrow(Mask& bone, double closing_mm) {
 /// Keeps what hangs together with the seed after narrow bridges have been eroded away, grown back to its old outline.
 bool cutNecks(Mask& bone, const Vec3& seed, double neck_mm) {
   Mask core = eroded(bone, neck_mm);
-  const auto start = nearestSet(core, seed, 6 * neck_mm);
-  if (!start) return false;
-  const std::vector<std::size_t> kept = takeConnected(core, *start, core.set.size());
+  const std::vector<std::size_t> kept = islandNear(core, seed, 6 * neck_mm, 1, core.set.size());
+  if (kept.empty()) return false;
   std::fill(core.set.begin(), core.set.end(), std::uint8_t{0});
   for (const std::size_t v : kept) core.set[v] = 1;
   const double back = neck_mm + 0.5 * norm(bone.spacing_mm);
@@ -208,12 +219,13 @@ Result<LabelVolume> growFromSeed(const CtVolume& ct, const GrowOptions& options)
   if (auto ok = checkOptions(ct, options); !ok) return tl::unexpected(ok.error());
   auto region = regionOf(ct, options);
   if (!region) return tl::unexpected(region.error());
-  const auto start = nearestSet(region->bone, region->grid.toVoxel(options.seed_patient), options.seed_reach_mm);
-  if (!start) return tl::unexpected(noBoneAtSeed(ct, options));
-
   const Vec3& s = ct.grid.spacing_mm;
-  const double most = std::min(options.max_volume_mm3 / (s.x * s.y * s.z), static_cast<double>(ct.grid.voxels()));
-  const auto voxels = takeConnected(region->bone, *start, static_cast<std::size_t>(most));
+  const double voxel_mm3 = s.x * s.y * s.z;
+  const double most = std::min(options.max_volume_mm3 / voxel_mm3, static_cast<double>(ct.grid.voxels()));
+  const auto voxels =
+      islandNear(region->bone, region->grid.toVoxel(options.seed_patient), options.seed_reach_mm,
+                 static_cast<std::size_t>(std::ceil(kLeastIsland_mm3 / voxel_mm3)), static_cast<std::size_t>(most));
+  if (voxels.empty()) return tl::unexpected(noBoneAtSeed(ct, options));
   if (static_cast<double>(voxels.size()) > most) return tl::unexpected(leaked(options));
 
   Island island = islandOf(region->bone, voxels, options.closing_mm);

@@ -21,7 +21,9 @@ struct GrowOptions {
   /// Gaps up to twice this in the cortical shell are bridged while the marrow is filled. The canal and the foramina
   /// are wider and open at both ends, so they stay open.
   double closing_mm = 1.5;
-  double seed_reach_mm = 3;         ///< the nearest bone voxel within this of the seed is taken
+  /// The nearest bone within this of the seed is taken, so that a seed in marrow darker than the threshold finds its
+  /// shell.
+  double seed_reach_mm = 15;
   double max_volume_mm3 = 250'000;  ///< an L3 has some 60,000 to 90,000; more means that growth leaked
 
   static constexpr double kNoLimit = 1e300;

@@ -101,11 +101,20 @@ TEST(GrowFromSeed, BridgesASmallGapInTheShellBeforeFilling) {
 TEST(GrowFromSeed, StartsFromTheNearestBoneAndNamesTheHuWhereThereIsNone) {
   const CtVolume ct = paint(gridAround(), vertebraHu);
   EXPECT_TRUE(growFromSeed(ct, seedAt({11.5, 0, 0})).has_value());  // marrow, 1.5 mm from the shell
-  const auto far = growFromSeed(ct, seedAt({0, 0, 0}));
+  GrowOptions near = seedAt({0, 0, 0});
+  near.seed_reach_mm = 3;
+  const auto far = growFromSeed(ct, near);
   ASSERT_FALSE(far.has_value());
   EXPECT_EQ(far.error().code, ErrorCode::NotFound);
   EXPECT_NE(far.error().message.find("90 HU"), std::string::npos) << far.error().message;
   EXPECT_NE(far.error().message.find("150 HU"), std::string::npos) << far.error().message;
+}
+
+TEST(GrowFromSeed, PassesOverSpecksOfNoiseInDarkMarrow) {
+  const CtVolume ct = paint(gridAround(), [](const Vec3& p) { return norm(p) < 3 ? 400.0 : vertebraHu(p); });
+  const auto label = growFromSeed(ct, seedAt({0, 0, 0}));
+  ASSERT_TRUE(label.has_value()) << label.error().message;
+  EXPECT_EQ(at(*label, {14, 0, 0}), 1);
 }
 
 TEST(GrowFromSeed, StopsWhenItLeaks) {
