@@ -61,7 +61,10 @@ class Staging {
     std::error_code error;
     Staging staging;
     staging.out_ = out_dir;
-    staging.made_out_ = fs::create_directories(out_dir, error);
+    for (fs::path folder = fs::absolute(out_dir, error); !fs::exists(folder, error); folder = folder.parent_path()) {
+      staging.made_.push_back(folder);
+    }
+    fs::create_directories(out_dir, error);
     if (error) return fail(ErrorCode::Io, "phantom: cannot make the output folder: " + error.message());
     const bool empty = fs::is_empty(out_dir, error);
     if (error) return fail(ErrorCode::Io, "phantom: cannot read the output folder: " + error.message());
@@ -75,7 +78,7 @@ class Staging {
   Staging& operator=(Staging&& other) noexcept {
     std::swap(out_, other.out_);
     std::swap(names_, other.names_);
-    std::swap(made_out_, other.made_out_);
+    std::swap(made_, other.made_);
     std::swap(open_, other.open_);
     return *this;
   }
@@ -83,11 +86,10 @@ class Staging {
   Staging& operator=(const Staging&) = delete;
 
   ~Staging() {
-    if (!open_) return;
     std::error_code ignored;
-    fs::remove_all(folder(), ignored);
+    if (open_) fs::remove_all(folder(), ignored);
     for (const std::string& name : names_) fs::remove(out_ / name, ignored);
-    if (made_out_) fs::remove(out_, ignored);
+    for (const fs::path& folder : made_) fs::remove(folder, ignored);
   }
 
   Result<void> write(const std::string& name, const char* data, std::size_t size) {
@@ -107,6 +109,8 @@ class Staging {
     }
     fs::remove(folder(), error);
     open_ = false;
+    names_.clear();
+    made_.clear();
     return {};
   }
 
@@ -116,7 +120,8 @@ class Staging {
 
   fs::path out_;
   std::vector<std::string> names_;
-  bool made_out_ = false, open_ = false;
+  std::vector<fs::path> made_;  // folders that were not there before, innermost first
+  bool open_ = false;
 };
 
 PhantomSeriesSummary summaryOf(const phantom::Phantom& phantom, const volume::Grid& grid) {
