@@ -22,8 +22,8 @@ Site Lattice::site(std::uint32_t index) const {
   site.disc = static_cast<int>(index / pointsPerDisc());
   const std::uint32_t rest = index % pointsPerDisc();
   if (rest == 0) return site;
-  // ringStart(k) = 3k(k-1) + 1 <= rest, solved for k; the loops absorb the square root's rounding.
-  int ring = static_cast<int>(0.5 + std::sqrt(0.25 + (static_cast<double>(rest) - 1.0) / 3.0));
+  // ringStart(k) = 3k(k-1) + 1 <= rest, nearly solved for k; the loops do the rest.
+  int ring = static_cast<int>(std::sqrt((static_cast<double>(rest) - 1.0) / 3.0));
   while (ringStart(ring) > rest) --ring;
   while (ringStart(ring + 1) <= rest) ++ring;
   site.ring = ring;

@@ -28,7 +28,7 @@ Lattice randomLattice(Random& random) {
   Lattice lattice;
   lattice.spacing_mm = kSpacings[random.below(5)];
   lattice.rings = 1 + static_cast<int>(random.below(45));
-  const std::uint64_t most = 1 + 120000 / lattice.pointsPerDisc();
+  const std::uint64_t most = 1 + 80000 / lattice.pointsPerDisc();
   lattice.discs = 1 + static_cast<int>(random.below(std::min<std::uint64_t>(most, 200)));
   lattice.first_disc = static_cast<int>(random.below(40)) - 20;
   return lattice;
