@@ -141,7 +141,7 @@ void addDrill(Program& program) {
   sub->add_option("--out", o->out, "Write the recording here");
   sub->add_flag("--no-store", o->no_store, "Do not keep the recording with the case");
   sub->add_option("--data", o->data, kDataHelp);
-  sub->final_callback([o] {
+  sub->parse_complete_callback([o] {
     if (o->volume.empty() && o->path_id.empty()) throw CLI::RequiredError("CASE and PATH, or --volume report");
     if (o->scene.empty() && o->trace.empty()) throw CLI::RequiredError("--scene or --trace");
   });
