@@ -1,11 +1,10 @@
 // wasm/binding_help.h - bytes, numbers and errors between JavaScript and the core.
 #pragma once
-#include <emscripten/stack.h>
 #include <emscripten/val.h>
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,23 +13,15 @@
 
 namespace spinaltap::wasm {
 
-/// Throws a JavaScript Error of one line. The wasm frames above are left without unwinding, so the caller holds nothing
-/// when it calls; `stack` (emscripten_stack_get_current() of the outermost frame) is put back.
-[[noreturn]] void throwError(const std::string& message, std::uintptr_t stack);
+/// Keeps the message for takeError(); errors.js throws it once the binding has returned.
+void keepError(Error error);
 
-/// work() returns a Result<T>; T must be movable and default constructible. Everything that work held is gone before an
-/// error is thrown.
-template <class T, class Work>
-T orThrow(Work&& work) {
-  const std::uintptr_t stack = emscripten_stack_get_current();
-  static std::string message;  // survives the throw, so that it is not lost to it
-  message.clear();
-  {
-    Result<T> result = work();
-    if (result) return std::move(*result);
-    message = std::move(result.error().message);
-  }
-  throwError(message, stack);
+/// What was made, or null with the error kept.
+template <class T>
+T* orNull(Result<std::unique_ptr<T>> made) {
+  if (made) return made->release();
+  keepError(std::move(made.error()));
+  return nullptr;
 }
 
 /// @error InvalidArgument, when it is not a Uint8Array.

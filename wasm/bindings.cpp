@@ -1,32 +1,22 @@
 // wasm/bindings.cpp - what JavaScript sees of the core. See README.md.
 #include <emscripten/bind.h>
-#include <emscripten/emscripten.h>
 
-#include <cmath>
+#include <algorithm>
+#include <cstdio>
+#include <utility>
 
 #include "core/session/scenes.h"
 #include "wasm/binding_help.h"
 #include "wasm/session_binding.h"
-
-// clang-format off
-EM_JS(void, spinaltapThrow, (const char* message, std::uintptr_t stack), {
-  const text = UTF8ToString(message);
-  stackRestore(stack);
-  throw new Error(text);
-});
-// clang-format on
 
 namespace spinaltap::wasm {
 namespace {
 
 using emscripten::val;
 
-struct SceneResult {
-  std::string hash;
-  double removed = 0, cycles = 0;
-};
+std::string kept_error;
 
-Result<SceneResult> sceneResult(const std::string& name, const std::string& engine, double cycles, double discs) {
+Result<val> sceneResult(const std::string& name, const std::string& engine, double cycles, double discs) {
   const Result<session::Scene> scene = session::sceneNamed(name);
   if (!scene) return tl::unexpected(scene.error());
   if (!(discs >= 0 && discs <= 1e6 && cycles >= 0)) return fail(ErrorCode::InvalidArgument, "scene: cycles or discs");
@@ -41,22 +31,26 @@ Result<SceneResult> sceneResult(const std::string& name, const std::string& engi
       cycles == 0 ? session::sceneCycles(*scene, length_mm) : std::min(wholeOf(cycles), session::kMostSceneCycles);
   session::Output output;
   for (std::uint64_t i = 0; i < count; ++i) output = session->step(session::sceneInput(*scene, i));
-  return SceneResult{hexOf(session->stateHash()), static_cast<double>(output.removed_total),
-                     static_cast<double>(output.cycle)};
+  val result = val::object();
+  result.set("hash", hexOf(session->stateHash()));
+  result.set("removed", static_cast<double>(output.removed_total));
+  result.set("cycles", static_cast<double>(output.cycle));
+  return result;
 }
 
-SceneResult runScene(const std::string& name, const std::string& engine, double cycles, double discs) {
-  return orThrow<SceneResult>([&] { return sceneResult(name, engine, cycles, discs); });
+val makeScene(const std::string& name, const std::string& engine, double cycles, double discs) {
+  Result<val> result = sceneResult(name, engine, cycles, discs);
+  if (result) return *result;
+  keepError(std::move(result.error()));
+  return val::null();
 }
 
+std::string takeError() { return std::move(kept_error); }
 std::string version() { return SPINALTAP_VERSION; }
 
 }  // namespace
 
-[[noreturn]] void throwError(const std::string& message, std::uintptr_t stack) {
-  spinaltapThrow(message.c_str(), stack);
-  __builtin_unreachable();
-}
+void keepError(Error error) { kept_error = std::move(error.message); }
 
 Result<std::vector<std::byte>> bytesOf(const val& array, const char* what) {
   if (!array.instanceof(val::global("Uint8Array"))) {
@@ -110,11 +104,8 @@ val floatsOf(const std::vector<splats::Splat>& splats) {
 EMSCRIPTEN_BINDINGS(spinaltap_core) {
   bindSession();
   bindPlayer();
-  emscripten::value_object<SceneResult>("SceneResult")
-      .field("hash", &SceneResult::hash)
-      .field("removed", &SceneResult::removed)
-      .field("cycles", &SceneResult::cycles);
-  emscripten::function("runScene", &runScene);
+  emscripten::function("makeScene", &makeScene);
+  emscripten::function("takeError", &takeError);
   emscripten::function("version", &version);
   emscripten::constant("splatRadiusPerSpacing", splats::kCoveringRadiusPerSpacing);
 }

@@ -112,15 +112,13 @@ Result<std::unique_ptr<PlayerBinding>> fromBytes(const val& array) {
   return std::make_unique<PlayerBinding>(std::move(*player));
 }
 
-PlayerBinding* make(const val& array) {
-  return orThrow<std::unique_ptr<PlayerBinding>>([&] { return fromBytes(array); }).release();
-}
+PlayerBinding* make(const val& array) { return orNull(fromBytes(array)); }
 
 }  // namespace
 
 void bindPlayer() {
-  emscripten::class_<PlayerBinding>("Player")
-      .constructor(&make, emscripten::allow_raw_pointers())
+  emscripten::function("makePlayer", &make, emscripten::allow_raw_pointers());
+  emscripten::class_<PlayerBinding>("RecordingPlayer")
       .function("cycles", &PlayerBinding::cycles)
       .function("headerJson", &PlayerBinding::headerJson)
       .function("seek", &PlayerBinding::seek)

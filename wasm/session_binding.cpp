@@ -1,22 +1,9 @@
 #include "wasm/session_binding.h"
 
 #include <emscripten/bind.h>
-#include <emscripten/emscripten.h>
 
 #include "core/wire/point_volume_message.h"
 #include "wasm/binding_help.h"
-
-// clang-format off
-// Caught here, since an exception thrown through wasm frames would leave them without unwinding.
-EM_JS(int, spinaltapParse, (const char* text), {
-  try {
-    Module["parsedConfig"] = JSON.parse(UTF8ToString(text));
-    return 1;
-  } catch (error) {
-    return 0;
-  }
-});
-// clang-format on
 
 namespace spinaltap::wasm {
 namespace {
@@ -85,13 +72,7 @@ Result<std::unique_ptr<SessionBinding>> fromBytes(const val& bytes_array, const 
   return SessionBinding::create(std::move(*volume), *settings);
 }
 
-SessionBinding* make(const val& bytes, const std::string& config_json) {
-  return orThrow<std::unique_ptr<SessionBinding>>([&]() -> Result<std::unique_ptr<SessionBinding>> {
-           if (spinaltapParse(config_json.c_str()) == 0) return fail(ErrorCode::InvalidArgument, "config: not JSON");
-           return fromBytes(bytes, val::module_property("parsedConfig"));
-         })
-      .release();
-}
+SessionBinding* make(const val& bytes, const val& config) { return orNull(fromBytes(bytes, config)); }
 
 metrics::Plan planOf(const SessionBinding::Settings& settings, const point_volume::Lattice& lattice) {
   return {settings.header.config.bit, settings.length_mm, lattice, {}};
@@ -179,8 +160,8 @@ void bindSession() {
       .field("removed_total", &StepResult::removed_total)
       .field("thrust_N", &StepResult::thrust_N)
       .field("depth_mm", &StepResult::depth_mm);
-  emscripten::class_<SessionBinding>("Session")
-      .constructor(&make, emscripten::allow_raw_pointers())
+  emscripten::function("makeSession", &make, emscripten::allow_raw_pointers());
+  emscripten::class_<SessionBinding>("LiveSession")
       .function("step", &SessionBinding::step)
       .function("stateHash", &SessionBinding::stateHash)
       .function("points", &SessionBinding::points)
