@@ -11,6 +11,11 @@ namespace {
 
 using Image = std::vector<float>;  // one slice, i fastest
 
+/// A thin layer of bone: which part of each pixel it fills, and the sum of its HU over that part.
+struct Layer {
+  Image covered, hu;
+};
+
 constexpr int kBlock = 8;          // pixels; whole blocks far from bone are skipped
 constexpr int kSoftStep = 2;       // soft tissue is evaluated every so many pixels and slices
 constexpr double kNearEdge = 0.4;  // mm of signed distance within which pixels are supersampled
@@ -77,17 +82,18 @@ class Sampler {
     }
   }
 
-  /// What bone adds to `soft` in the thin layer at slice coordinate k (may lie between slices).
-  void boneLayer(double k, const Image& soft, Image& out) {
-    std::fill(out.begin(), out.end(), 0.0f);
+  /// Bone in the layer at slice coordinate k (may lie between slices), `step` slices thick.
+  void boneLayer(double k, double step, Layer& out) {
+    std::fill(out.covered.begin(), out.covered.end(), 0.0f);
+    std::fill(out.hu.begin(), out.hu.end(), 0.0f);
     const double half = 0.5 * kBlock;
-    const double reach = Phantom::kLipschitz * norm(di_ * half + dj_ * half);
+    const double reach = Phantom::kLipschitz * norm(di_ * half + dj_ * half + dk_ * (0.5 * step));
     for (int j = 0; j < ny_; j += kBlock) {
       for (int i = 0; i < nx_; i += kBlock) {
         const Vec3 centre = at(i + half - 0.5, j + half - 0.5, k);
         // Far from the whole bone the implicit need not be asked.
         if (!nearBone(centre, reach)) continue;
-        if (boneDistance(phantom_.anatomy(), centre) <= reach) boneBlock(i, j, k, soft, out);
+        if (boneDistance(phantom_.anatomy(), centre) <= reach) boneBlock(i, j, k, step, out);
       }
     }
   }
@@ -121,32 +127,33 @@ class Sampler {
     }
   }
 
-  void boneBlock(int i0, int j0, double k, const Image& soft, Image& out) {
+  void boneBlock(int i0, int j0, double k, double step, Layer& out) {
     for (int j = j0; j < std::min(j0 + kBlock, ny_); ++j) {
-      for (int i = i0; i < std::min(i0 + kBlock, nx_); ++i) {
-        const std::size_t n = static_cast<std::size_t>(j) * nx_ + static_cast<std::size_t>(i);
-        out[n] = bonePixel(i, j, k, soft[n]);
-      }
+      for (int i = i0; i < std::min(i0 + kBlock, nx_); ++i) bonePixel(i, j, k, step, out);
     }
   }
 
-  /// Mean of bone HU minus soft HU over the pixel: one sample inside, four where an edge may cross.
-  [[nodiscard]] float bonePixel(int i, int j, double k, float soft) const {
+  /// One sample well inside, four where an edge may cross: spread over the pixel and, each at its own height, over the
+  /// layer, so that flat endplates do not come out in terraces.
+  void bonePixel(int i, int j, double k, double step, Layer& out) {
+    const std::size_t n = static_cast<std::size_t>(j) * nx_ + static_cast<std::size_t>(i);
     const Vec3 p = at(i, j, k);
     const double s = boneDistance(phantom_.anatomy(), p);
-    if (s > kNearEdge) return 0;
-    const double shell = phantom_.tissue().shellThickness(p);
-    if (s < -kNearEdge && std::fabs(s + shell) > kNearEdge) return difference(p, s, soft);
-    float sum = 0;
-    for (int quarter = 0; quarter < 4; ++quarter) {
-      const Vec3 q = at(i + (quarter & 1 ? 0.25 : -0.25), j + (quarter & 2 ? 0.25 : -0.25), k);
-      sum += difference(q, boneDistance(phantom_.anatomy(), q), soft);
+    if (s > kNearEdge) return;
+    if (s < -kNearEdge && std::fabs(s + phantom_.tissue().shellThickness(p)) > kNearEdge) {
+      out.covered[n] = 1;
+      out.hu[n] = static_cast<float>(phantom_.tissue().boneHu(phantom_.anatomy(), p, -s));
+      return;
     }
-    return 0.25f * sum;
-  }
-
-  [[nodiscard]] float difference(const Vec3& p, double s, float soft) const {
-    return s < 0 ? static_cast<float>(phantom_.tissue().boneHu(phantom_.anatomy(), p, -s)) - soft : 0.0f;
+    constexpr double kHeights[4] = {-0.375, 0.125, 0.375, -0.125};
+    for (int quarter = 0; quarter < 4; ++quarter) {
+      const Vec3 q =
+          at(i + (quarter & 1 ? 0.25 : -0.25), j + (quarter & 2 ? 0.25 : -0.25), k + kHeights[quarter] * step);
+      const double sq = boneDistance(phantom_.anatomy(), q);
+      if (sq >= 0) continue;
+      out.covered[n] += 0.25f;
+      out.hu[n] += 0.25f * static_cast<float>(phantom_.tissue().boneHu(phantom_.anatomy(), q, -sq));
+    }
   }
 
   const Phantom& phantom_;
@@ -154,6 +161,53 @@ class Sampler {
   Vec3 origin_, di_, dj_, dk_;  // the grid in the vertebra's frame
   Image low_plane_, high_plane_;
   int low_k_ = -1, high_k_ = -1;
+};
+
+/// Slices, before point spread and noise. Thin layers, two or more a slice, are made once each and shared by the slices
+/// that they lie in.
+class Stack {
+ public:
+  Stack(const Phantom& phantom, const volume::Grid& grid, const CtOptions& options)
+      : sampler_(phantom, grid),
+        layers_per_slice_(std::max(2, static_cast<int>(std::ceil(options.spacing_mm / 0.3)))),
+        profile_(sliceProfile(options.thickness_mm, options.spacing_mm / layers_per_slice_)),
+        reach_(static_cast<int>(profile_.size()) / 2),
+        next_(-reach_) {
+    const std::size_t pixels = static_cast<std::size_t>(options.dims[0]) * static_cast<std::size_t>(options.dims[1]);
+    ring_.assign(profile_.size(), Layer{Image(pixels), Image(pixels)});
+    bone_.resize(pixels);
+    soft_part_.resize(pixels);
+  }
+
+  /// @pre  slices are asked for in order.
+  void slice(int k, Image& out) {
+    const int middle = k * layers_per_slice_;
+    for (next_ = std::max(next_, middle - reach_); next_ <= middle + reach_; ++next_) {
+      sampler_.boneLayer(static_cast<double>(next_) / layers_per_slice_, 1.0 / layers_per_slice_, held(next_));
+    }
+    std::fill(bone_.begin(), bone_.end(), 0.0f);
+    std::fill(soft_part_.begin(), soft_part_.end(), 1.0f);
+    for (int n = -reach_; n <= reach_; ++n) add(held(middle + n), profile_[static_cast<std::size_t>(n + reach_)]);
+    sampler_.softSlice(k, out);
+    for (std::size_t p = 0; p < out.size(); ++p) out[p] = out[p] * soft_part_[p] + bone_[p];
+  }
+
+ private:
+  Layer& held(int layer) { return ring_[static_cast<std::size_t>(layer + reach_) % ring_.size()]; }
+
+  void add(const Layer& layer, float weight) {
+    for (std::size_t p = 0; p < bone_.size(); ++p) {
+      bone_[p] += weight * layer.hu[p];
+      soft_part_[p] -= weight * layer.covered[p];
+    }
+  }
+
+  Sampler sampler_;
+  int layers_per_slice_;
+  std::vector<float> profile_;
+  int reach_, next_;  // half the profile's layers; the first layer not yet made
+  std::vector<Layer> ring_;
+  Image bone_, soft_part_;
 };
 
 /// [w, 1 - 2w, w] along rows and then columns; edges repeat.
@@ -224,26 +278,11 @@ Result<volume::CtVolume> sampleCt(const Phantom& phantom, const CtOptions& optio
   if (auto ok = volume::checkGrid(ct.grid); !ok) return tl::unexpected(ok.error());
   ct.hu.resize(ct.grid.voxels());
 
-  // Thin layers, two (or more) a slice, are made once each and shared by the slices they lie in.
-  const int layers_per_slice = std::max(2, static_cast<int>(std::ceil(options.spacing_mm / 0.3)));
-  const std::vector<float> profile = sliceProfile(options.thickness_mm, options.spacing_mm / layers_per_slice);
-  const int width = static_cast<int>(profile.size()), reach = width / 2;
+  Stack stack(phantom, ct.grid, options);
   const std::size_t pixels = static_cast<std::size_t>(options.dims[0]) * static_cast<std::size_t>(options.dims[1]);
-  std::vector<Image> ring(static_cast<std::size_t>(width), Image(pixels));
-  Sampler sampler(phantom, ct.grid);
-  Image soft(pixels), image(pixels), noise(pixels), scratch(pixels);
-  int next = -reach;  // the first layer not yet made
+  Image image(pixels), noise(pixels), scratch(pixels);
   for (int k = 0; k < options.dims[2]; ++k) {
-    sampler.softSlice(k, soft);
-    for (next = std::max(next, k * layers_per_slice - reach); next <= k * layers_per_slice + reach; ++next) {
-      sampler.boneLayer(static_cast<double>(next) / layers_per_slice, soft,
-                        ring[static_cast<std::size_t>((next + reach) % width)]);
-    }
-    image = soft;
-    for (int n = 0; n < width; ++n) {
-      const Image& layer = ring[static_cast<std::size_t>((k * layers_per_slice + n) % width)];
-      for (std::size_t p = 0; p < pixels; ++p) image[p] += profile[static_cast<std::size_t>(n)] * layer[p];
-    }
+    stack.slice(k, image);
     spread(image, options, scratch);
     addNoise(image, options, phantom.options().seed, k, noise, scratch);
     std::transform(image.begin(), image.end(),

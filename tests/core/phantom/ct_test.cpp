@@ -9,7 +9,7 @@
 namespace spinaltap::phantom {
 namespace {
 
-constexpr std::uint64_t kGoldenHash1 = 14470703379135520200ULL, kGoldenHash1Osteoporotic = 10948993536285397447ULL;
+constexpr std::uint64_t kGoldenHash1 = 1234482016650530493ULL, kGoldenHash1Osteoporotic = 9809589978547268987ULL;
 
 std::uint64_t hashOf(const volume::CtVolume& ct) {
   std::uint64_t hash = 0;
