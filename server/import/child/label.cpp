@@ -83,6 +83,8 @@ struct RawLabel {
 
 Result<RawLabel> readInside(ByteSource& source, const NiftiHeader& header, const std::string& name, int wanted) {
   RawLabel label;
+  label.inside.reserve(static_cast<std::size_t>(header.dims[0]) * static_cast<std::size_t>(header.dims[1]) *
+                       static_cast<std::size_t>(header.dims[2]));
   int last = 0;
   const auto row = [&](std::span<const double> voxels) -> Result<void> {
     for (const double v : voxels) {

@@ -189,9 +189,27 @@ Result<double> millimetresPerUnit(int units, const std::string& name, std::vecto
   }
 }
 
+/// Where the last voxel lies tells two placements apart as well as anything.
+Vec3 farCorner(const NiftiHeader& header) {
+  Vec3 corner = header.origin_patient;
+  for (std::size_t i = 0; i < 3; ++i) corner += header.steps_patient[i] * static_cast<double>(header.dims[i] - 1);
+  return corner;
+}
+
+/// nifti1.h leaves the choice to the program when a file has both; a program that chose otherwise sees another volume.
+void noteDisagreement(const RawHeader& raw, const std::string& name, NiftiHeader& header) {
+  if (raw.qform <= 0) return;
+  NiftiHeader other = header;
+  fromQform(raw, other);
+  const double apart =
+      std::max(norm(other.origin_patient - header.origin_patient), norm(farCorner(other) - farCorner(header)));
+  if (!(apart <= 0.1)) header.notes.push_back(name + ": its sform and qform disagree; the sform was used");
+}
+
 Result<void> readGeometry(const RawHeader& raw, const std::string& name, NiftiHeader& header) {
   if (raw.sform > 0) {
     fromSform(raw, header);
+    noteDisagreement(raw, name, header);
   } else if (raw.qform > 0) {
     fromQform(raw, header);
   } else {

@@ -115,6 +115,8 @@ TEST(NiftiImport, PrefersTheSformOverTheQuaternion) {
   const auto result = importBytes(file.bytes());
   ASSERT_TRUE(result.has_value()) << result.error().message;
   expectValuesInPlace(*result, file);
+  ASSERT_EQ(result->notes.size(), 1u);
+  EXPECT_NE(result->notes[0].find("disagree"), std::string::npos);
 }
 
 TEST(NiftiImport, AppliesSlopeAndIntercept) {
