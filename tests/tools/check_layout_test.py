@@ -11,6 +11,7 @@ PLANTED = {
     "core/mesh/a.cpp": ('#include "core/rbf/rbf.h"\n', "core/mesh may not include"),
     "core/haptics/b.h": ('#include "core/point_volume/point_volume.h"\n', "core/haptics may not include"),
     "core/base/c.cpp": ("#include <fstream>\n", "core has no files"),
+    "core/plan/k.cpp": ('void f() { printf("x"); }\n', "core has no files, but calls printf"),
     "core/volume/d.cpp": ('#include "server/store/store.h"\n', "core may not include"),
     "server/cli/e.cpp": ('#include "tests/scenes/scenes.h"\n', "server may not include"),
     "server/cli/f.cpp": ("#include <gdcmImageReader.h>\n", "belongs to server/import/"),
@@ -21,6 +22,7 @@ PLANTED = {
 FINE = {
     "core/session/x.h": '#include "core/drill/engine.h"\n#include <vector>\n',
     "core/tradeoff/y.cpp": '#include "core/rbf/rbf.h"\n',
+    "core/metrics/n.cpp": "#include <cstdio>\nint n = std::snprintf(nullptr, 0, \"1\");\n",
     "server/import/z.cpp": "#include <gdcmImageReader.h>\n",
     "tests/core/t.cpp": '#include "core/rbf/rbf.h"\n',
 }
