@@ -9,6 +9,7 @@
 #include "core/base/dmath.h"
 #include "core/base/random.h"
 #include "core/mesh/cube_table.h"
+#include "core/mesh/parts.h"
 #include "tests/core/mesh/mesh_check.h"
 
 namespace spinaltap::mesh {
@@ -152,6 +153,19 @@ TEST(Polygonise, FindsOnlyTheSurfacesThatHaveASeed) {
   expectClosedManifold(*two);
   EXPECT_EQ(check(*two).parts, 2U);
   EXPECT_EQ(check(*two).euler, 4);
+}
+
+TEST(LargestPart, KeepsTheLargerOfTwoBallsWhole) {
+  const auto two = [](const Vec3& p) { return std::min(norm(p - Vec3{6, 0, 0}) - 2, norm(p + Vec3{4, 0, 0}) - 4); };
+  const auto both = polygonise(fieldOf(two), std::vector<Vec3>{{8, 0, 0}, {-8, 0, 0}}, boxOf(10, 0.5));
+  ASSERT_TRUE(both.has_value());
+  ASSERT_EQ(check(*both).parts, 2U);
+  const TriangleMesh one = largestPart(*both);
+  expectClosedManifold(one);
+  EXPECT_EQ(check(one).parts, 1U);
+  EXPECT_NEAR(check(one).volume_mm3, 4.0 / 3 * kPi * 64, 8);  // the sagittas of 0.5 mm cells: some 3 %
+  for (const Vec3& v : one.vertices) EXPECT_NEAR(norm(v + Vec3{4, 0, 0}), 4, 1e-3);
+  EXPECT_TRUE(largestPart({}).vertices.empty());
 }
 
 TEST(Polygonise, DoesNotDependOnTheOrderOrNumberOfSeeds) {
