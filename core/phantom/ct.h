@@ -31,7 +31,7 @@ using Progress = std::function<void(double)>;
 /// Axial slices along the patient's axes, k towards the head, centred so that the whole bone is in the field of view
 /// (with the default extent). HU in -1024 .. 3071. The same bits for the same options on every target.
 /// @error  InvalidArgument (dims not positive, lengths not positive or not finite, noise negative), Limit.
-/// @cost   6 to 7 s on one core for the default options, 200 MB.
+/// @cost   about 6 s on one core for the default options, 80 MB.
 [[nodiscard]] Result<volume::CtVolume> sampleCt(const Phantom& phantom, const CtOptions& options = {},
                                                 const Progress& progress = {});
 
