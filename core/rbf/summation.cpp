@@ -11,8 +11,6 @@ namespace {
 
 // The loop over the points of a block is the one that vectorises: a sum over centres cannot, as its order is fixed.
 constexpr std::size_t kBlock = 8;
-// Below this many centre-point pairs (about a millisecond) a thread costs more than it saves.
-constexpr std::size_t kPairsWorthAThread = 1'000'000;
 
 struct Block {
   double x[kBlock], y[kBlock], z[kBlock];
@@ -82,6 +80,9 @@ void inParts(const FlatModel& m, std::span<const Vec3> points, std::span<Out> ou
   serial(m, points, out);
 }
 #else
+// Below this many centre-point pairs (about a millisecond) a thread costs more than it saves.
+constexpr std::size_t kPairsWorthAThread = 1'000'000;
+
 /// Contiguous parts, one a thread; whichever part cannot get a thread is done here.
 template <class Out, class Serial>
 void inParts(const FlatModel& m, std::span<const Vec3> points, std::span<Out> out, Serial serial) {
