@@ -149,6 +149,10 @@ Result<ParsedHeader> parseHeader(const InputFile& input, std::size_t index) {
   classify(set, textAt(header.file->GetHeader(), {0x0002, 0x0002}), identity);
   identity.series = textAt(set, {0x0020, 0x000e}) + "|" + textAt(set, {0x0008, 0x0060});
   identity.lossy = isLossy(*header.file);
+  // The headers of all files are held at once; their pixels are not.
+  const gdcm::Tag pixels(0x7fe0, 0x0010);
+  identity.has_pixels = set.FindDataElement(pixels);
+  header.file->GetDataSet().Remove(pixels);
   return header;
 }
 

@@ -25,6 +25,7 @@ struct Identity {
   std::string what;    ///< "an MR image", "a structured report": from a fixed list, never from the header
   std::string series;  ///< SeriesInstanceUID and modality; kept in this process
   bool lossy = false;
+  bool has_pixels = false;
 };
 
 struct ParsedHeader {

@@ -163,14 +163,15 @@ Result<StoredPixels> readPixelModule(const gdcm::DataSet& set, const std::string
 }
 
 /// Text values of ImageType are compared, never shown.
-Result<void> checkUsable(const gdcm::DataSet& set, const std::string& name) {
+Result<void> checkUsable(const gdcm::DataSet& set, const Identity& identity) {
+  const std::string& name = identity.name;
   if (textAt(set, {0x0008, 0x0008}).find("LOCALIZER") != std::string::npos) {
     return fail(ErrorCode::Unsupported, name + ": a localizer, not a slice of a volume");
   }
   if (textAt(set, {0x0028, 0x0301}) == "YES") {
     return fail(ErrorCode::Unsupported, name + ": BurnedInAnnotation: its pixels may name the patient");
   }
-  if (!has(set, {0x7fe0, 0x0010})) return fail(ErrorCode::Corrupt, name + ": no pixel data");
+  if (!identity.has_pixels) return fail(ErrorCode::Corrupt, name + ": no pixel data");
   return {};
 }
 
@@ -208,7 +209,7 @@ Result<void> readGeometry(FrameScope& scope, Slice& slice) {
 Result<std::vector<Slice>> slicesOf(const ParsedHeader& header, std::uint64_t voxel_limit) {
   const gdcm::DataSet& set = header.file->GetDataSet();
   const std::string& name = header.identity.name;
-  if (auto usable = checkUsable(set, name); !usable) return tl::unexpected(usable.error());
+  if (auto usable = checkUsable(set, header.identity); !usable) return tl::unexpected(usable.error());
   const auto pixels = readPixelModule(set, name);
   if (!pixels) return tl::unexpected(pixels.error());
   const auto frames = frameCount(set, header, *pixels, voxel_limit);

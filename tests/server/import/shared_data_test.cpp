@@ -3,6 +3,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "server/import/child_process.h"
+#include "server/import/protocol.h"
+#include "server/import/sanitized.h"
 #include "tests/server/import/made_files.h"
 
 namespace spinaltap::importer {
@@ -190,6 +193,26 @@ const Expected kCollected[] = {
 TEST(HostileData, EndsEveryCollectedFileAsItsTableSays) {
   NEED_SHARED_DATA();
   checkTable(kShared / "hostile/collected", kCollected, true);
+}
+
+TEST(HostileData, SpendsNoMemoryOnWhatAFileOnlyDeclares) {
+  NEED_SHARED_DATA();
+  if (SPINALTAP_SANITIZED != 0) GTEST_SKIP() << "AddressSanitizer's own memory is in the figure";
+  for (const char* file : {"made-files/08_pixeldata-length-2gb.dcm", "made-files/15_rows-cols-65535.dcm",
+                           "made-files/37_frames-two-billion.dcm", "made-files/45_jpeg-65535x65535.dcm",
+                           "made-files/47_j2k-huge-siz.dcm", "made-files/52_encapsulated-item-4gb.dcm",
+                           "made-files/57_deflate-bomb-256mb.dcm", "collected/3gb-bulk-data-truncated"}) {
+    ImportRequest request;
+    request.from = kShared / "hostile" / file;
+    request.allow_single_slice = true;
+    ChildStreams streams;
+    streams.output = [](std::span<const std::byte>) { return true; };
+    const auto end = runChild(defaultChildProgram(), {}, encodeRequest(request), request.limits.wall_time, streams);
+    ASSERT_TRUE(end.has_value());
+    // The sandbox gives 192 MiB, and eight times the input (at most 0.25 MB here), beyond program and libraries (64
+    // MiB).
+    EXPECT_LT(end->max_resident_kib, (192 + 64 + 2) * 1024) << file;
+  }
 }
 
 const Expected kSeries[] = {
