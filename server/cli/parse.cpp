@@ -49,7 +49,9 @@ void addPhantom(Program& program) {
   sub->add_option("--out", o->out, "Folder to write: made when it is not there, refused when it holds files")
       ->required();
   sub->add_flag("--osteoporotic", o->osteoporotic, "60-90 HU inside a shell of 0.5 mm, not 140-230 HU in 1 mm");
-  sub->add_option("--seed", o->seed, "Varies the anatomy and the noise")->capture_default_str();
+  sub->add_option("--seed", o->seed, "Varies the anatomy and the noise")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   sub->add_option("--reduce", o->reduce, "Voxels this many times wider: small and quick")
       ->check(CLI::Range(1, 8))
       ->capture_default_str();
@@ -98,7 +100,9 @@ void addReconstruct(Program& program) {
       ->capture_default_str();
   sub->add_option("--smoothing", o->smoothing_mm, "Averages the samples' noise, mm; 0 interpolates")
       ->capture_default_str();
-  sub->add_option("--max-centres", o->max_centres, "No more centres than this")->capture_default_str();
+  sub->add_option("--max-centres", o->max_centres, "No more centres than this")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   sub->add_option("--cell", o->cell_mm, "Size of the mesh's cells, mm")->capture_default_str();
   sub->add_option("--data", o->data, kDataHelp);
 }
@@ -137,7 +141,8 @@ void addDrill(Program& program) {
   sub->add_option("--engine", o->engine, "How points are removed")
       ->check(oneOf(drill::engineNames()))
       ->capture_default_str();
-  sub->add_option("--cycles", o->cycles, "At most so many (default: to the end of the path or the trace)");
+  sub->add_option("--cycles", o->cycles, "At most so many (default: to the end of the path or the trace)")
+      ->check(CLI::NonNegativeNumber);
   sub->add_option("--out", o->out, "Write the recording here");
   sub->add_flag("--no-store", o->no_store, "Do not keep the recording with the case");
   sub->add_option("--data", o->data, kDataHelp);

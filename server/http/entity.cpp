@@ -54,17 +54,17 @@ bool rangeWanted(const Request& request, const Entity& entity) {
 }  // namespace
 
 bool takesGzip(std::string_view accept_encoding) {
-  bool takes = false;
+  std::optional<bool> by_name, by_star;
   eachItem(accept_encoding, [&](std::string_view item) {
     const std::size_t semicolon = item.find(';');
     const std::string_view name = trimmed(item.substr(0, semicolon));
-    if (name != "gzip" && name != "*") return;
     const std::string_view parameters = semicolon == std::string_view::npos ? "" : trimmed(item.substr(semicolon + 1));
     const bool refused =
         parameters.substr(0, 2) == "q=" && parameters.substr(2).find_first_not_of("0.") == std::string_view::npos;
-    if (name == "gzip" || !takes) takes = !refused;
+    if (name == "gzip") by_name = !refused;
+    if (name == "*") by_star = !refused;
   });
-  return takes;
+  return by_name.value_or(by_star.value_or(false));
 }
 
 RangeKind parseRange(std::string_view header, std::uint64_t size, ByteRange& range) {

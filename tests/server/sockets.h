@@ -21,10 +21,12 @@ namespace spinaltap::test {
 /// A blocking connection to loopback that gives up after ten seconds.
 class Connection {
  public:
-  explicit Connection(int port) : handle_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+  /// @param window  bytes that may wait here unread; 0 leaves it to the system.
+  explicit Connection(int port, int window = 0) : handle_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     const timeval limit{10, 0};
     ::setsockopt(handle_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
     ::setsockopt(handle_, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
+    if (window > 0) ::setsockopt(handle_, SOL_SOCKET, SO_RCVBUF, &window, sizeof window);
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(static_cast<std::uint16_t>(port));
@@ -110,8 +112,8 @@ inline Reply readReply(Connection& connection, bool has_body = true) {
 }
 
 struct Ask {
-  std::string method = "GET", target = "/", body;
-  std::vector<std::string> headers;  ///< "Name: value"
+  std::string method = "GET", target = "/", body = {};
+  std::vector<std::string> headers = {};  ///< "Name: value"
   std::string host = "127.0.0.1";
 };
 
@@ -137,7 +139,8 @@ inline Reply post(int port, const std::string& target, const nlohmann::json& bod
 /// A WebSocket client that masks with zeros (allowed by RFC 6455, and easy to read in a debugger).
 class WebSocket {
  public:
-  WebSocket(int port, const std::string& target, const std::vector<std::string>& headers = {}) : connection_(port) {
+  WebSocket(int port, const std::string& target, const std::vector<std::string>& headers = {}, int window = 0)
+      : connection_(port, window) {
     Ask upgrade{"GET", target, "", headers};
     for (const char* header : {"Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
                                "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="}) {

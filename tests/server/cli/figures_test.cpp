@@ -1,0 +1,196 @@
+// The whole way on a small phantom, through the real program; the keys against the tables of server/cli/README.md.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "tests/server/program.h"
+#include "tests/server/temporary_folder.h"
+
+namespace spinaltap::test {
+namespace {
+
+struct Keys {
+  std::set<std::string> always, sometimes;
+};
+
+/// The first column of the table under "### name"; keys in *italics* are there only sometimes.
+std::map<std::string, Keys> documentedKeys() {
+  std::map<std::string, Keys> documented;
+  std::ifstream readme(SPINALTAP_CLI_README);
+  std::string command;
+  for (std::string line; std::getline(readme, line);) {
+    if (line.rfind("### ", 0) == 0) command = line.substr(4);
+    if (command.empty() || line.rfind("| ", 0) != 0 || line.rfind("| key", 0) == 0) continue;
+    std::string column = line.substr(2, line.find(" |", 2) - 2);
+    const bool sometimes = column.front() == '*';
+    std::erase(column, '*');
+    const std::regex word("[A-Za-z0-9_]+");
+    for (std::sregex_iterator at(column.begin(), column.end(), word), end; at != end; ++at) {
+      (sometimes ? documented[command].sometimes : documented[command].always).insert(at->str());
+    }
+  }
+  return documented;
+}
+
+void expectDocumented(const std::string& command, const Json& figures) {
+  static const auto documented = documentedKeys();
+  ASSERT_TRUE(figures.is_object()) << command << " prints one JSON object";
+  ASSERT_TRUE(documented.contains(command)) << command;
+  const Keys& keys = documented.at(command);
+  for (const auto& key : keys.always) EXPECT_TRUE(figures.contains(key)) << command << " lacks " << key;
+  for (const auto& [key, value] : figures.items()) {
+    EXPECT_TRUE(keys.always.contains(key) || keys.sometimes.contains(key))
+        << command << ": " << key << " is undocumented";
+    EXPECT_FALSE(value.is_null()) << command << ": " << key;
+  }
+}
+
+std::string joined(const Json& point) { return point[0].dump() + "," + point[1].dump() + "," + point[2].dump(); }
+
+/// A small phantom, prepared once.
+class Figures : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    phantom_ = json({"phantom", "--out", path("ct"), "--reduce", "3"}, "phantom");
+    const Json imported = json({"import", "--from", path("ct"), "--name", "small", "--data", path("data")}, "import");
+    case_ = imported.value("case_id", "");
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  static std::string path(const std::string& name) { return (folder_->path() / name).string(); }
+  static Json json(std::vector<std::string> arguments, const std::string& command) {
+    arguments.emplace_back("--json");
+    const auto finished = run(arguments);
+    EXPECT_EQ(finished.code, 0) << finished.err;
+    EXPECT_EQ(finished.err, "") << "no progress when standard error is no terminal";
+    const Json figures = finished.json();
+    expectDocumented(command, figures);
+    return figures;
+  }
+
+  static TemporaryFolder* folder_;
+  static Json phantom_;
+  static std::string case_;
+};
+TemporaryFolder* Figures::folder_ = nullptr;
+Json Figures::phantom_;
+std::string Figures::case_;
+
+TEST_F(Figures, OfEveryCommandAreDocumentedFromPhantomToReplay) {
+  const std::string data = path("data");
+  const Json segmented =
+      json({"segment", case_, "--seed", joined(phantom_["seed_point_patient"]), "--data", data}, "segment");
+  EXPECT_EQ(segmented["source"], "segmented");
+  EXPECT_NEAR(segmented["volume_mm3"].get<double>() / phantom_["bone_mm3"].get<double>(), 1.0, 0.25)
+      << "voxels of a millimetre and more, and a threshold";
+
+  const Json made =
+      json({"reconstruct", case_, "--max-centres", "300", "--sample-spacing", "2", "--cell", "1.5", "--data", data},
+           "reconstruct");
+  EXPECT_LE(made["centres"], 300);
+  EXPECT_GT(made["samples"], made["centres"]);
+  EXPECT_LT(made["residual_rms_mm"], made["residual_max_mm"]);
+
+  const Json& pedicle = phantom_["pedicles"]["left"];
+  const Json planned = json({"plan", case_, "--entry", joined(pedicle["entry_patient"]), "--target",
+                             joined(pedicle["target_patient"]), "--spacing", "0.25", "--label", "left", "--data", data},
+                            "plan");
+  EXPECT_GT(planned["points_alive"], planned["points"].get<int>() / 2);
+
+  const std::string path_id = planned["path_id"];
+  const Json drilled =
+      json({"drill", case_, path_id, "--scene", "on", "--out", path("on.rec"), "--data", data}, "drill");
+  EXPECT_GT(drilled["removed"], 1000);
+  EXPECT_GT(drilled["peak_thrust_N"], 0);
+  EXPECT_TRUE(drilled.contains("breach_mm"));
+  EXPECT_NEAR(drilled["depth_max_mm"].get<double>(), planned["length_mm"].get<double>(), 0.011) << "to within a cycle";
+
+  for (const std::string& recording : {path("on.rec"), drilled["recording_id"].get<std::string>()}) {
+    const Json replayed = json({"replay", recording, "--data", data}, "replay");
+    EXPECT_EQ(replayed["verified"], true);
+    EXPECT_EQ(replayed["hash"], drilled["hash"]);
+    EXPECT_EQ(replayed["cycles"], drilled["cycles"]);
+  }
+  const Json not_kept =
+      json({"drill", case_, path_id, "--scene", "hand", "--cycles", "500", "--no-store", "--data", data}, "drill");
+  EXPECT_EQ(not_kept["cycles"], 500);
+  EXPECT_FALSE(not_kept.contains("recording_id"));
+  const Json list = json({"cases", "--data", data}, "cases");
+  EXPECT_EQ(list["cases"][0]["stage"], "reconstructed");
+  EXPECT_EQ(list["cases"][0]["recordings"], 1);
+  std::ignore = json({"version"}, "version");
+}
+
+TEST_F(Figures, OfAnUnsegmentedCaseSayWhatComesFirst) {
+  const auto imported = run({"import", "--from", path("ct"), "--data", path("fresh"), "--json"}).json();
+  const std::string id = imported["case_id"];
+  EXPECT_EQ(run({"segment", id, "--data", path("fresh")}).err,
+            "spinaltap: case " + id + " was imported without a label: give a seed\n");
+  EXPECT_EQ(run({"reconstruct", id, "--data", path("fresh")}).err,
+            "spinaltap: case " + id + " has no label yet: segment it first\n");
+  EXPECT_EQ(run({"plan", id, "--entry", "0,0,0", "--target", "0,0,9", "--data", path("fresh")}).err,
+            "spinaltap: case " + id + " is not reconstructed yet\n");
+}
+
+TEST_F(Figures, AreALineEachWithoutJson) {
+  const auto finished = run({"version"});
+  EXPECT_EQ(finished.out.rfind("version  ", 0), 0u) << finished.out;
+}
+
+TEST(DrillScene, GivesOneHashWhetherScriptedOrAsATraceAndByEitherExactEngine) {
+  const TemporaryFolder folder;
+  const std::string trace = (folder.path() / "off.csv").string();
+  std::ofstream csv(trace);
+  csv << "t_us,x,y,z,ax,ay,az\n";
+  for (int i = 0; i < 300; ++i) csv << 1000 * i << ",1,0," << Json(0.01 * i).dump() << ",0,0,1\n";
+  csv.close();
+  const Json scene = run({"drill", "--volume", "report", "--scene", "off", "--cycles", "300", "--json"}).json();
+  EXPECT_EQ(scene["points"], 986958);
+  EXPECT_EQ(scene["discs"], 378);
+  for (const char* engine : {"bounded", "reference"}) {
+    const Json traced = run({"drill", "--volume", "report", "--trace", trace, "--engine", engine, "--json"}).json();
+    expectDocumented("drill", traced);
+    EXPECT_EQ(traced["hash"], scene["hash"]) << engine;
+    EXPECT_EQ(traced["removed"], scene["removed"]) << engine;
+    EXPECT_EQ(traced["trace_poses"], 300);
+  }
+}
+
+TEST(DrillScene, NamesTheLineOfATraceThatIsWrong) {
+  const TemporaryFolder folder;
+  const std::string trace = (folder.path() / "bad.csv").string();
+  std::ofstream(trace) << "0,0,0,0,0,0,1\n1000,0,0\n";
+  const auto finished = run({"drill", "--volume", "report", "--trace", trace});
+  EXPECT_EQ(finished.code, 1);
+  EXPECT_EQ(finished.err, "spinaltap: bad.csv line 2: 7 numbers are needed (t_us, tip x y z, axis x y z), 3 found\n");
+}
+
+TEST(DrillScene, CountsRefusedPosesAndGoesOn) {
+  const TemporaryFolder folder;
+  const std::string trace = (folder.path() / "odd.csv").string();
+  std::ofstream(trace) << "0,0,0,0,0,0,1\n1000,nan,0,0,0,0,1\n2000,0,0,1,0,0,0\n3000,0,0,1,0,0,1\n2000,0,0,1,0,0,1\n";
+  const Json figures = run({"drill", "--volume", "report", "--trace", trace, "--json"}).json();
+  EXPECT_EQ(figures["cycles"], 2);
+  EXPECT_EQ(figures["refused"], 3);
+}
+
+TEST(Replay, OfAChangedRecordingIsNotVerifiedAndEndsWithOne) {
+  const TemporaryFolder folder;
+  const std::string file = (folder.path() / "on.rec").string();
+  ASSERT_EQ(run({"drill", "--volume", "report", "--scene", "on", "--cycles", "1500", "--out", file}).code, 0);
+  EXPECT_EQ(run({"replay", file, "--json"}).json()["scene"], "on");
+  // cut inside the first chunk of inputs: nothing is left to verify
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 20'000);
+  const auto cut = run({"replay", file, "--json"});
+  EXPECT_EQ(cut.json()["complete"], false);
+  EXPECT_EQ(cut.code, cut.json()["verified"].get<bool>() ? 0 : 1);
+  std::filesystem::resize_file(file, 100);
+  EXPECT_EQ(run({"replay", file}).code, 1);
+}
+
+}  // namespace
+}  // namespace spinaltap::test
