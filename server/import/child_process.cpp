@@ -65,6 +65,55 @@ Result<Pipes> makePipes() {
   return Pipes{std::move(*input), std::move(*output), std::move(*progress)};
 }
 
+/// What the child finds: three pipes, nothing else open, no signal blocked or ignored, a process group of its own.
+class SpawnPlan {
+ public:
+  SpawnPlan(int in, int out, int progress) {
+    posix_spawn_file_actions_init(&actions_);
+    posix_spawn_file_actions_adddup2(&actions_, in, STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions_, out, STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions_, progress, kProgressDescriptor);
+#if !SPINALTAP_SANITIZED
+    // Parsers print header text to stderr, and header text may name a person. (A sanitizer's report is worth more.)
+    posix_spawn_file_actions_addopen(&actions_, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+#endif
+    posix_spawn_file_actions_addclosefrom_np(&actions_, kProgressDescriptor + 1);
+
+    sigset_t all, none;
+    sigfillset(&all);
+    sigemptyset(&none);
+    posix_spawnattr_init(&attributes_);
+    posix_spawnattr_setsigdefault(&attributes_, &all);
+    posix_spawnattr_setsigmask(&attributes_, &none);
+    posix_spawnattr_setpgroup(&attributes_, 0);
+    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
+  }
+  SpawnPlan(const SpawnPlan&) = delete;
+  SpawnPlan& operator=(const SpawnPlan&) = delete;
+  ~SpawnPlan() {
+    posix_spawn_file_actions_destroy(&actions_);
+    posix_spawnattr_destroy(&attributes_);
+  }
+
+  /// -1 when it cannot be started.
+  [[nodiscard]] pid_t run(const std::filesystem::path& program, const std::vector<std::string>& arguments) const {
+    std::vector<std::string> words{"spinaltap-import"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    argv.reserve(words.size() + 1);
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    std::array<char*, 1> environment{nullptr};
+    pid_t child = -1;
+    const int error = posix_spawn(&child, program.c_str(), &actions_, &attributes_, argv.data(), environment.data());
+    return error == 0 ? child : -1;
+  }
+
+ private:
+  posix_spawn_file_actions_t actions_{};
+  posix_spawnattr_t attributes_{};
+};
+
 Result<pid_t> start(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                     const Pipes& pipes) {
   // A pipe end may itself be descriptor 0 to 3; dup2 onto itself would keep close-on-exec, and one dup2 could close
@@ -73,40 +122,8 @@ Result<pid_t> start(const std::filesystem::path& program, const std::vector<std:
   const Descriptor out(fcntl(pipes.output.write.get(), F_DUPFD_CLOEXEC, 10));
   const Descriptor progress(fcntl(pipes.progress.write.get(), F_DUPFD_CLOEXEC, 10));
   if (!in.open() || !out.open() || !progress.open()) return fail(ErrorCode::Io, "no pipe for the importer");
-
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, in.get(), 0);
-  posix_spawn_file_actions_adddup2(&actions, out.get(), 1);
-  posix_spawn_file_actions_adddup2(&actions, progress.get(), kProgressDescriptor);
-#if !SPINALTAP_SANITIZED
-  // Parsers print header text to stderr, and header text may name a person. (A sanitizer's report is worth more.)
-  posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", O_WRONLY, 0);
-#endif
-  posix_spawn_file_actions_addclosefrom_np(&actions, kProgressDescriptor + 1);
-
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t all, none;
-  sigfillset(&all);
-  sigemptyset(&none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
-
-  std::vector<std::string> words{"spinaltap-import"};
-  words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  std::array<char*, 1> environment{nullptr};
-
-  pid_t child = -1;
-  const int failed = posix_spawn(&child, program.c_str(), &actions, &attributes, argv.data(), environment.data());
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  if (failed != 0) return fail(ErrorCode::Io, "cannot start spinaltap-import beside the program");
+  const pid_t child = SpawnPlan(in.get(), out.get(), progress.get()).run(program, arguments);
+  if (child < 0) return fail(ErrorCode::Io, "cannot start spinaltap-import beside the program");
   return child;
 }
 

@@ -5,6 +5,7 @@
 
 #include "server/import/child_process.h"
 #include "server/import/protocol.h"
+#include "server/import/sanitized.h"
 
 namespace spinaltap::importer {
 
@@ -41,6 +42,10 @@ Error errorOfEnd(const ChildEnd& end, const std::string& file, const ImportLimit
     std::string text = std::to_string(seconds);
     text.resize(text.find('.') + 2);
     return {ErrorCode::Limit, "the importer stopped on " + file + ": it took longer than " + text + " s"};
+  }
+  // A parser that gives up aborts; only a sanitizer's finding exits, and no test may take that for a refusal.
+  if (SPINALTAP_SANITIZED != 0 && end.exit_code != 0) {
+    return {ErrorCode::Corrupt, "a sanitizer stopped the importer on " + file};
   }
   if (end.signal == SIGABRT || end.exit_code != 0) {
     return {ErrorCode::Corrupt, "the importer stopped on " + file + ": its parser gave up on a broken file"};

@@ -156,6 +156,7 @@ inline void expectClean(const Error& error) {
   for (const char c : error.message) EXPECT_TRUE(c >= 0x20 && c < 0x7f) << "byte " << static_cast<int>(c);
   EXPECT_EQ(error.message.find(std::filesystem::temp_directory_path().string()), std::string::npos);
   EXPECT_EQ(error.message.find("SECRET"), std::string::npos);
+  EXPECT_EQ(error.message.find("a sanitizer"), std::string::npos) << error.message;
 }
 
 /// One-line refusal that holds `word`.
