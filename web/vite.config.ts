@@ -20,7 +20,7 @@ export default defineConfig({
     chunkSizeWarningLimit: 900,
   },
   server: {
-    proxy: { "/api": "http://127.0.0.1:8377", "/ws": { target: "ws://127.0.0.1:8377", ws: true } },
+    proxy: { "/api": "http://127.0.0.1:8080", "/ws": { target: "ws://127.0.0.1:8080", ws: true } },
     fs: { allow: [top] },
   },
 });

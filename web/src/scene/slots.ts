@@ -1,7 +1,7 @@
 // Places in a fixed buffer for things that come and go by index, and which stretches of it changed. Pure.
 
-/** A gap this short is cheaper to upload than a second call. */
-const kJoin = 64;
+/** A gap this short is cheaper to upload than a second call: drivers may copy a buffer in use at every call. */
+const kJoin = 2048;
 
 export class Slots {
   private readonly slot_of = new Map<number, number>();

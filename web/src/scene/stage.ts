@@ -29,6 +29,8 @@ export const kViewpoints: Record<string, { from: Vec3; up: Vec3; name: string }>
   F: { from: [0, 0.001, -1], up: [0, 0, 1], name: "from the feet" },
 };
 
+const kSlow_ms = 80;
+
 export class Stage {
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(28, 1, 1, 2000);
@@ -44,7 +46,10 @@ export class Stage {
   private readonly renderer: WebGLRenderer;
   private readonly observer: ResizeObserver;
   private readonly lamp = new DirectionalLight(0xffffff, 2.6);
-  private wanted = 0;
+  private wanted = false;
+  private gone = false;
+  /** From one picture's start to when the browser was ready for the next. */
+  private cost_ms = 0;
   private last_ms = 0;
   private home = 100;
 
@@ -81,7 +86,7 @@ export class Stage {
   };
 
   dispose(): void {
-    cancelAnimationFrame(this.wanted);
+    this.gone = true;
     this.observer.disconnect();
     this.controls.dispose();
     this.canvas.removeEventListener("webglcontextlost", this.lost);
@@ -90,15 +95,24 @@ export class Stage {
   }
 
   invalidate(): void {
-    if (this.wanted === 0) this.wanted = requestAnimationFrame((now) => this.draw(now));
+    if (this.wanted) return;
+    this.wanted = true;
+    // A machine that draws slowly gets as long a rest as a picture took, so that keys and sliders stay quick.
+    const rest_ms = this.cost_ms > kSlow_ms ? Math.min(this.cost_ms, 500) : 0;
+    if (rest_ms === 0) requestAnimationFrame((now) => this.draw(now));
+    else setTimeout(() => requestAnimationFrame((now) => this.draw(now)), rest_ms);
   }
 
   private draw(now: number): void {
-    this.wanted = 0;
+    if (this.gone) return;
+    this.wanted = false;
     const seconds = this.last_ms === 0 ? 0 : Math.min(0.1, (now - this.last_ms) / 1000);
     this.last_ms = now;
     const again = this.onFrame?.(seconds) ?? false;
     this.renderer.render(this.scene, this.camera);
+    requestAnimationFrame((next) => {
+      this.cost_ms = next - now;
+    });
     this.onView?.(this.camera.matrixWorldInverse);
     if (again) this.invalidate();
     else this.last_ms = 0;

@@ -247,7 +247,7 @@ export class VertebraScene {
     if (this.cut_away) this.turnCutPlane();
     if (this.spin === 0 || !this.bit) return false;
     this.bit.turn(this.spin * seconds);
-    return true;
+    return !matchMedia("(prefers-reduced-motion: reduce)").matches;
   }
 
   /** The plane holds the path's axis and faces the viewer, so the hole is open from wherever one looks. */

@@ -101,6 +101,7 @@ export class DrillSession {
   }
 
   private hearFrame(frame: Extract<FromWorker, { type: "frame" }>): void {
+    requestAnimationFrame(() => this.core.tell({ type: "shown" }));
     this.readings.value = frame.readings;
     this.onSplats?.(frame.splats);
     if (frame.trace.length === 0) return;

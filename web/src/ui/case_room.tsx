@@ -257,7 +257,7 @@ function recordingText(detail: CaseDetail, recording: RecordingInfo): string {
 const kFigureNames: [string, string, string][] = [
   ["triangles", "Triangles", ""],
   ["centres", "RBF centres", ""],
-  ["samples", "Boundary points", ""],
+  ["boundary_points", "Boundary points", ""],
   ["residual_rms_mm", "Fit error, RMS", "mm"],
   ["residual_max_mm", "Fit error, largest", "mm"],
 ];

@@ -244,17 +244,19 @@ function DrillReadings({ opened, session }: { opened: Opened; session: DrillSess
   const volume = pointVolume_mm3(opened.body.lattice);
   const past = (readings?.depth_mm ?? 0) - opened.path.length_mm;
   return (
-    <dl class="readings">
-      <Reading name="Depth" value={(readings?.depth_mm ?? 0).toFixed(2)} unit="mm" hot={past > 0.5} />
-      <Reading name="Thrust" value={(readings?.thrust_N ?? 0).toFixed(2)} unit="N" />
-      <Reading name="Bone removed" value={((readings?.removed ?? 0) * volume).toFixed(1)} unit="mm³" />
-      <Reading name="Cycles" value={rateText(readings?.rate_hz ?? 0)} unit="a second" />
+    <div class="reading-group">
+      <dl class="readings">
+        <Reading name="Depth" value={(readings?.depth_mm ?? 0).toFixed(2)} unit="mm" hot={past > 0.5} />
+        <Reading name="Thrust" value={(readings?.thrust_N ?? 0).toFixed(2)} unit="N" />
+        <Reading name="Bone removed" value={((readings?.removed ?? 0) * volume).toFixed(1)} unit="mm³" />
+        <Reading name="Cycles" value={rateText(readings?.rate_hz ?? 0)} unit="a second" />
+      </dl>
       <p class="reading-note">
         {past > 0.5
           ? `${past.toFixed(1)} mm past the target`
           : `Target at ${opened.path.length_mm.toFixed(1)} mm · ${(readings?.cycle ?? 0).toLocaleString("en")} cycles`}
       </p>
-    </dl>
+    </div>
   );
 }
 

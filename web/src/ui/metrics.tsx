@@ -3,29 +3,35 @@ import type { Metrics } from "../contract/rest";
 
 const kUnits: [string, string][] = [
   ["_mm3", "mm³"],
-  ["_mm_s", "mm/s"],
+  ["_mm_per_s", "mm/s"],
   ["_mm", "mm"],
   ["_deg", "°"],
   ["_N", "N"],
   ["_s", "s"],
 ];
 
+/** In the order in which they are shown; core/metrics/README.md says what they mean. */
 const kNames: Record<string, string> = {
   entry_error_mm: "Entry off by",
   tip_error_mm: "Tip off by",
-  depth_mm: "Deepest",
-  plunge_mm: "Past the target",
+  angle_error_deg: "Angle off by",
+  axial_angle_error_deg: "Axial angle off by",
+  sagittal_angle_error_deg: "Sagittal angle off by",
+  gertzbein_robbins: "Gertzbein-Robbins grade",
+  breach_mm: "Breach",
+  breach_direction: "Breach towards",
+  plunge_mm: "Plunge past the bone",
+  depth_max_mm: "Deepest",
   removed_mm3: "Bone removed",
   removed_outside_plan_mm3: "of it outside the plan",
-  outside_plan_mm3: "of it outside the plan",
   peak_thrust_N: "Peak thrust",
   mean_thrust_N: "Mean thrust",
+  mean_feed_mm_per_s: "Mean feed",
   time_s: "Time",
-  duration_s: "Time",
-  axial_angle_deg: "Axial angle off by",
-  sagittal_angle_deg: "Sagittal angle off by",
-  angle_deg: "Angle off by",
 };
+
+/** Known, but said better by another. */
+const kLeftOut = new Set(["removed", "cycles"]);
 
 export interface MetricRow {
   key: string;
@@ -35,8 +41,11 @@ export interface MetricRow {
 }
 
 export function metricRows(metrics: Metrics): MetricRow[] {
-  return Object.entries(metrics).flatMap(([key, value]) => {
-    if (value === null || typeof value === "object") return [];
+  const order = Object.keys(kNames);
+  const place = (key: string): number => (order.includes(key) ? order.indexOf(key) : order.length);
+  const sorted = Object.entries(metrics).sort(([a], [b]) => place(a) - place(b));
+  return sorted.flatMap(([key, value]) => {
+    if (value === null || typeof value === "object" || kLeftOut.has(key)) return [];
     const unit = kUnits.find(([ending]) => key.endsWith(ending));
     const stem = unit ? key.slice(0, -unit[0].length) : key;
     const plain = stem.replaceAll("_", " ");

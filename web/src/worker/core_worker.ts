@@ -15,6 +15,8 @@ let link: ServerLink | null = null;
 let player: CorePlayer | null = null;
 let timer = 0;
 let frame_due_ms = 0;
+let sent = { cycle: -1, rate_hz: -1 };
+let shown = true;
 /** While the page shows a section: when to send which points are left, and how many were gone the last time. */
 const watch = { on: false, due_ms: 0, removed: -1 };
 
@@ -62,6 +64,8 @@ function tick(): void {
     loop!.advanceTo(now);
     if (now < frame_due_ms) return;
     frame_due_ms = now + kFrame_ms;
+    sendBatch();
+    if (!shown) return;
     sendFrame();
     sendAlive(now);
   } catch (error) {
@@ -70,16 +74,24 @@ function tick(): void {
   }
 }
 
-function sendFrame(): void {
+function sendBatch(): void {
   const batch = loop!.takeBatch();
   if (batch) link?.send(batch);
+}
+
+function sendFrame(): void {
+  // While nothing moves there is nothing to draw.
+  const readings = loop!.readings();
+  if (readings.cycle === sent.cycle && readings.rate_hz === sent.rate_hz) return;
+  sent = readings;
+  shown = false;
   const rows = session!.takeSplats();
   const indices = session!.takeSplatIndices();
   const hidden = session!.takeHidden();
   const trace = loop!.takeTrace();
   const message = {
     type: "frame",
-    readings: loop!.readings(),
+    readings,
     splats: { rows, indices, hidden },
     trace,
   } as const;
@@ -101,6 +113,7 @@ function finishDrill(): void {
   if (!loop || finishing) return;
   finishing = true;
   self.clearInterval(timer);
+  sendBatch();
   sendFrame();
   if (link && !link.offline) link.finish();
   else endDrill(null, null);
@@ -155,6 +168,9 @@ async function handle(message: ToWorker): Promise<void> {
       return loop?.steer(message.steering);
     case "nudge":
       return loop?.nudge(message.displacement);
+    case "shown":
+      shown = true;
+      return;
     case "watch_alive":
       watch.on = message.on;
       watch.removed = -1;

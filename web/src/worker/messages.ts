@@ -21,6 +21,8 @@ export type ToWorker =
   | { type: "steer"; steering: Steering }
   | { type: "nudge"; displacement: Vec3 }
   | { type: "watch_alive"; on: boolean }
+  /** The last frame has been drawn: the next may come. A page that draws slowly is never flooded. */
+  | { type: "shown" }
   | { type: "finish_drill" }
   | { type: "open_replay"; recording: Uint8Array; verify_only: boolean }
   | { type: "seek"; cycle: number }

@@ -8,7 +8,7 @@ export const kCycle_s = 0.001;
 const kSideways_mm_s = 2;
 const kTilt_rad_s = (6 * Math.PI) / 180;
 const kMaxTilt_rad = (45 * Math.PI) / 180;
-/** The bit may be led this far from the path and no farther. */
+/** The bit may be led this far beside and before the path; no deeper than its tested length, where its chuck begins. */
 const kReach_mm = 60;
 
 /** What the hand asks for now: each of -1 .. 1, and displacements still owed from a drag or a wheel. */
@@ -65,7 +65,7 @@ export function nextState(state: BitState, steering: Steering, reach_mm: number)
   const x = clamp(clamp(steering.sideways[0], 1) * side + owed[0], kMaxStep_mm / 2);
   const y = clamp(clamp(steering.sideways[1], 1) * side + owed[1], kMaxStep_mm / 2);
   const moved = add(state.tip, add(scale(axis, along), add(scale(right, x), scale(up, y))));
-  return { tip: withinReach(moved), axis, owed: sub(state.owed, owed).map(tidy) as Vec3 };
+  return { tip: withinReach(moved, reach_mm), axis, owed: sub(state.owed, owed).map(tidy) as Vec3 };
 }
 
 /** The path frame's x and y, made perpendicular to the bit. */
@@ -87,8 +87,9 @@ function tilted(axis: Vec3, tilt: [number, number], reach_mm: number): Vec3 {
   return leaned[2] >= Math.cos(kMaxTilt_rad) ? leaned : axis;
 }
 
-function withinReach(tip: Vec3): Vec3 {
-  return tip.map((v) => clamp(v, kReach_mm)) as Vec3;
+function withinReach(tip: Vec3, reach_mm: number): Vec3 {
+  const [x, y, z] = tip.map((v) => clamp(v, kReach_mm)) as Vec3;
+  return [x, y, Math.min(z, reach_mm)];
 }
 function clamp(v: number, limit: number): number {
   return Math.max(-limit, Math.min(limit, v));

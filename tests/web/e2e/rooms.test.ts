@@ -1,0 +1,308 @@
+// A user's way through the rooms, in a real browser against the real server.
+import { mkdtempSync, readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import type { Browser, Page } from "playwright-core";
+import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
+import { keepPicture, kSlow_ms, launch, lookAt, openPage } from "./browser";
+import { type Served, serve, serveNothing, top } from "./served";
+
+let served: Served;
+let browser: Browser;
+let page: Page;
+let errors: string[];
+
+beforeAll(async () => {
+  served = await serve();
+  browser = await launch();
+  ({ page, errors } = await openPage(browser));
+}, 5 * kSlow_ms);
+
+afterAll(async () => {
+  await browser?.close();
+  await served?.stop();
+});
+
+afterEach(() => {
+  expect(errors.splice(0), "errors in the page's console").toEqual([]);
+});
+
+const axe_source = readFileSync(
+  createRequire(resolve(top, "web/package.json")).resolve("axe-core/axe.min.js"),
+  "utf8",
+);
+
+interface AxeResult {
+  violations: { id: string; impact: string | null; nodes: { html: string }[] }[];
+}
+
+/** WCAG A and AA, serious and critical. */
+async function expectAccessible(): Promise<void> {
+  // Through the debugger: the server's policy rightly allows no foreign script.
+  await page.evaluate(axe_source);
+  const found = await page.evaluate(() => {
+    const axe = (globalThis as unknown as { axe: { run: (options: object) => Promise<AxeResult> } }).axe;
+    return axe.run({ resultTypes: ["violations"] });
+  });
+  const bad = found.violations.filter(({ impact }) => impact === "serious" || impact === "critical");
+  expect(
+    bad.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(" | ")}`),
+  ).toEqual([]);
+}
+
+const reading = async (name: string): Promise<number> =>
+  Number((await page.locator(`[data-reading="${name}"]`).textContent())!.replaceAll(",", ""));
+
+/** Waits until `probe` is true, asking a few times a second. */
+async function until(what: string, probe: () => Promise<boolean>): Promise<void> {
+  for (const end = Date.now() + kSlow_ms; Date.now() < end; ) {
+    if (await probe()) return;
+    await page.waitForTimeout(200);
+  }
+  throw new Error(`waited in vain until ${what}`);
+}
+
+async function firstCase(): Promise<void> {
+  await page.goto(`${served.address}/#/`);
+  await page.locator(".case-card").first().click();
+  await page.locator(".slice").first().waitFor();
+}
+
+describe("cases", () => {
+  test("are listed and opened by keyboard", async () => {
+    await page.goto(`${served.address}/#/`);
+    const card = page.locator(".case-card").first();
+    await card.waitFor();
+    expect(await card.textContent()).toMatch(/Phantom L3.*reconstructed.*2 paths/);
+    await expectAccessible();
+    await keepPicture(page, "cases");
+    await card.focus();
+    await page.keyboard.press("Enter");
+    await page.locator(".slice").first().waitFor();
+    expect(page.url()).toMatch(/#\/case\/\w+$/);
+  });
+
+  test("an empty folder says what to type", async () => {
+    const empty = await serveNothing(mkdtempSync(join(tmpdir(), "spinaltap-empty-")));
+    try {
+      await page.goto(`${empty.address}/#/`);
+      await page.locator(".empty").waitFor();
+      expect(await page.locator(".empty pre").textContent()).toContain("spinaltap import");
+      await expectAccessible();
+    } finally {
+      await empty.stop();
+    }
+  });
+
+  test("what is not there is said in words", async () => {
+    await page.goto(`${served.address}/#/case/nosuchcase`);
+    await page.locator('[role="alert"]').waitFor();
+    expect(await page.locator('[role="alert"]').textContent()).toMatch(/could not be opened/);
+    // The browser itself logs the 404 that the page has put into words.
+    await page.waitForTimeout(100);
+    expect(errors.splice(0).every((error) => /404/.test(error))).toBe(true);
+  });
+});
+
+describe("a case", () => {
+  test("shows the vertebra and its three slices", async () => {
+    await firstCase();
+    for (const plane of ["transaxial", "coronal", "sagittal"]) {
+      const picture = page.locator(`.slice-${plane} canvas`);
+      const look = await picture.evaluate((canvas: HTMLCanvasElement) => {
+        const { data } = canvas.getContext("2d")!.getImageData(0, 0, canvas.width, canvas.height);
+        let bright = 0;
+        let dark = 0;
+        for (let i = 0; i < data.length; i += 4) {
+          if (data[i]! > 150) ++bright;
+          if (data[i]! < 100) ++dark;
+        }
+        return { bright: (4 * bright) / data.length, dark: (4 * dark) / data.length };
+      });
+      // Cortex is bright in the bone window and a small part of the slice; soft tissue is dark and the most of it.
+      expect(look.bright, plane).toBeGreaterThan(0.005);
+      expect(look.bright, plane).toBeLessThan(0.4);
+      expect(look.dark, plane).toBeGreaterThan(0.3);
+    }
+    await page.waitForTimeout(1000);
+    const solid = await lookAt(page, page.locator(".scene-canvas"));
+    expect(solid.busy, "the vertebra fills a part of the picture").toBeGreaterThan(0.2);
+    expect(solid.bright, "and is lit").toBeGreaterThan(0.03);
+    await expectAccessible();
+    await keepPicture(page, "case");
+  });
+
+  test("a click in one slice moves the others, and shows bone's HU", async () => {
+    const slider = (plane: string) => page.getByLabel(`${plane} position`);
+    const before = await slider("Coronal").inputValue();
+    const box = (await page.locator(".slice-transaxial svg").boundingBox())!;
+    await page.mouse.click(box.x + box.width * 0.5, box.y + box.height * 0.3);
+    expect(await slider("Coronal").inputValue()).not.toBe(before);
+    // Walk across the picture: somewhere there is cortex, somewhere soft tissue.
+    const seen: number[] = [];
+    for (let part = 0.2; part < 0.8; part += 0.02) {
+      await page.mouse.move(box.x + box.width * part, box.y + box.height * 0.5);
+      seen.push(Number(await page.locator(".slice-transaxial .slice-hu").getAttribute("data-hu")));
+    }
+    expect(Math.max(...seen)).toBeGreaterThan(300);
+    expect(Math.min(...seen)).toBeLessThan(150);
+  });
+
+  test("the wheel and the arrow keys page and move", async () => {
+    const slider = page.getByLabel("Transaxial position");
+    const before = Number(await slider.inputValue());
+    await page.locator(".slice-transaxial svg").hover();
+    await page.mouse.wheel(0, 120);
+    await until("the wheel turns a page", async () => Number(await slider.inputValue()) !== before);
+    const sagittal = page.getByLabel("Sagittal position");
+    const across = Number(await sagittal.inputValue());
+    await page.locator(".slice-transaxial .slice-picture").focus();
+    await page.keyboard.press("ArrowRight");
+    expect(Number(await sagittal.inputValue())).toBeGreaterThan(across);
+  });
+
+  test("the other path can be chosen, and a reload keeps it", async () => {
+    const facts_now = () => page.locator(".facts").first().textContent();
+    const first = await facts_now();
+    await page.locator(".path-card input").nth(1).check();
+    await page.waitForURL(/\/path\//);
+    await until("the other path's figures are shown", async () => (await facts_now()) !== first);
+    const facts = await facts_now();
+    await page.reload();
+    await page.locator(".slice").first().waitFor();
+    expect(await page.locator(".path-card input").nth(1).isChecked()).toBe(true);
+    expect(await facts_now()).toBe(facts);
+  });
+});
+
+describe("a drill", () => {
+  test("cuts bone by keys, and the server agrees", async () => {
+    await firstCase();
+    await page.getByText("Drill this path").click();
+    await page.locator('[data-agreement="agrees"]').waitFor();
+    await page.keyboard.down("KeyW");
+    let peak = 0;
+    await until("the bit is 6 mm deep", async () => {
+      peak = Math.max(peak, await reading("Thrust"));
+      return (await reading("Depth")) > 6;
+    });
+    await page.keyboard.up("KeyW");
+    expect(peak).toBeGreaterThan(0.5);
+    // At least half of a cone of 5 mm, pi * 1.5^2 * 5 / 3 = 11.8 mm3, and the bit went on a little.
+    expect(await reading("Bone removed")).toBeGreaterThan(6);
+    const cycle = async (): Promise<number> =>
+      Number((await page.locator("[data-agreement]").textContent())!.replace(/[^0-9]/g, "") || 0);
+    await until("the server has answered a late cycle", async () => (await cycle()) > 800);
+    expect(await page.locator("[data-agreement]").getAttribute("data-agreement")).toBe("agrees");
+    await page.waitForTimeout(1500);
+    await keepPicture(page, "drill");
+    await expectAccessible();
+  });
+
+  test("a bit that stands still cuts nothing", async () => {
+    await page.locator(".panel-title").click();
+    await page.keyboard.press("Space");
+    await page.getByText("Bit stands still").waitFor();
+    const before = await reading("Bone removed");
+    const depth = await reading("Depth");
+    await page.keyboard.down("KeyW");
+    await until("the bit is deeper", async () => (await reading("Depth")) > depth + 0.5);
+    await page.keyboard.up("KeyW");
+    expect(await reading("Bone removed")).toBe(before);
+    await page.keyboard.press("Space");
+    await page.getByText("Bit is turning").waitFor();
+  });
+
+  test("the pads and the wheel on the bit move it too", async () => {
+    const pad = (await page.locator('[data-pad="tall"]').boundingBox())!;
+    const depth = await reading("Depth");
+    await page.mouse.move(pad.x + pad.width / 2, pad.y + pad.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(pad.x + pad.width / 2, pad.y + 4, { steps: 3 });
+    await until("the bit is withdrawn", async () => (await reading("Depth")) < depth - 1);
+    await page.mouse.up();
+  });
+
+  test("the cut-away shows the hole's wall", async () => {
+    await page.getByRole("button", { name: "Cut-away" }).click();
+    await page.waitForTimeout(2500);
+    const look = await lookAt(page, page.locator(".scene-canvas"));
+    expect(look.busy).toBeGreaterThan(0.3);
+    await keepPicture(page, "cut-away");
+    await page.getByRole("button", { name: "Cut-away" }).click();
+  });
+
+  test("finishes: the server keeps the recording and gives the metrics", async () => {
+    await page.getByRole("button", { name: "Finish the drill" }).click();
+    await page.locator(".finished").waitFor();
+    expect(await page.locator('[data-metric="peak_thrust_N"] .number').textContent()).toMatch(/^\d/);
+    expect(await page.locator(".finished code").textContent()).toMatch(/^\w+$/);
+    await expectAccessible();
+    await keepPicture(page, "finished");
+  });
+});
+
+describe("a replay", () => {
+  test("is verified, and plays the drill again", async () => {
+    await page.locator(".finished").getByText("Replay").click();
+    await page.locator('[data-verified="true"]').waitFor();
+    const slider = page.getByLabel("Moment, in cycles");
+    const last = Number(await slider.getAttribute("max"));
+    expect(last).toBeGreaterThan(800);
+    await until("the end is shown", async () => (await reading("Bone removed")) > 6);
+    await page.waitForTimeout(1500);
+    await expectAccessible();
+    await keepPicture(page, "replay");
+  });
+
+  test("the slider moves the moment, forth and back", async () => {
+    const slider = page.getByLabel("Moment, in cycles");
+    const end = await reading("Bone removed");
+    await slider.focus();
+    await page.keyboard.press("Home");
+    await until("nothing is cut yet", async () => (await reading("Bone removed")) === 0);
+    expect(await reading("Depth")).toBeLessThan(0);
+    await page.keyboard.press("End");
+    await until("all is cut again", async () => (await reading("Bone removed")) === end);
+  });
+
+  test("plays by itself", async () => {
+    await page.getByLabel("Moment, in cycles").focus();
+    await page.keyboard.press("Home");
+    await page.getByRole("button", { name: "Play" }).click();
+    await until(
+      "time passes",
+      async () => Number(await page.getByLabel("Moment, in cycles").inputValue()) > 300,
+    );
+    await page.getByRole("button", { name: "Pause" }).click();
+  });
+
+  test("is found again from the case, and after a reload", async () => {
+    const address = page.url();
+    await page.reload();
+    await page.locator('[data-verified="true"]').waitFor();
+    await firstCase();
+    const link = page.locator(`.recording-list a[href="${new URL(address).hash}"]`);
+    expect(await link.textContent()).toContain("Replay");
+  });
+});
+
+describe("without the server", () => {
+  test("a drill goes on alone, says so, and can be replayed here", async () => {
+    await firstCase();
+    await page.route("**/api/v1/sessions", (route) => route.abort());
+    await page.getByText("Drill this path").click();
+    await page.locator('[data-agreement="offline"]').waitFor();
+    await page.getByLabel("Feed").selectOption("10");
+    await page.keyboard.down("KeyW");
+    await until("bone is cut", async () => (await reading("Bone removed")) > 2);
+    await page.keyboard.up("KeyW");
+    await page.getByRole("button", { name: "Finish the drill" }).click();
+    await page.locator(".finished").getByText("Replay").click();
+    await page.locator('[data-verified="true"]').waitFor();
+    await page.unroute("**/api/v1/sessions");
+    // The browser logs the request that the test cut.
+    expect(errors.splice(0).every((error) => /ERR_FAILED/.test(error))).toBe(true);
+  });
+});
