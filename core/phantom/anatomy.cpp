@@ -40,10 +40,9 @@ struct Section {
 
 Section section(const Anatomy& an, const Vec3& p) {
   // Waisted: the width grows towards the rims.
-  const double t = std::min(square(p.z / an.half_height), 1.3);
-  const double flare = 0.6 * t + 0.4 * t * t;
-  const double a = an.waist_half_width + (an.rim_half_width - an.waist_half_width) * std::min(flare, 1.15);
-  const double b = an.waist_half_depth + (an.rim_half_depth - an.waist_half_depth) * std::min(flare, 1.15);
+  const double flare = smoothStep(0.0, 1.5, square(p.z / an.half_height)) / smoothStep(0.0, 1.5, 1.0);
+  const double a = an.waist_half_width + (an.rim_half_width - an.waist_half_width) * flare;
+  const double b = an.waist_half_depth + (an.rim_half_depth - an.waist_half_depth) * flare;
   // Bent backwards like a kidney: the back wall turns concave, the front stays round.
   const double u = p.x / a;
   const double flat = 1.0 / (1.0 + p.x * p.x / 2500.0);  // far to the side the bend would only steepen the field
@@ -62,8 +61,11 @@ Section section(const Anatomy& an, const Vec3& p) {
 }
 
 double bodyOf(const Anatomy& an, const Vec3& p) {
-  const Section s = section(an, p);
-  const double side = (s.value - 1.0) * s.scale;
+  // The bend would steepen the field without end far away: from a box around the body on, count plain distance.
+  constexpr double kBox = 36.0;
+  const Vec3 near{std::clamp(p.x, -kBox, kBox), std::clamp(p.y, -kBox, kBox), p.z};
+  const Section s = section(an, near);
+  const double side = (s.value - 1.0) * s.scale + norm(p - near);
   // The endplate: a flat ring under the rim, and a dish inside it.
   const double dish = an.endplate_dish * square(std::max(1.0 - 1.3 * square(s.value), 0.0));
   const double height = an.half_height - an.wedge * p.y;

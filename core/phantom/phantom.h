@@ -48,8 +48,9 @@ class Phantom {
   [[nodiscard]] Vec3 gradient(const Vec3& patient) const;
   /// signedDistance and gradient as a callback, with kLipschitz; keeps the shape alive.
   [[nodiscard]] Field field() const;
-  /// |signedDistance(a) - signedDistance(b)| <= kLipschitz |a - b| everywhere; see anatomy.cpp and the tests.
-  static constexpr double kLipschitz = 1.4;
+  /// |signedDistance(a) - signedDistance(b)| <= kLipschitz |a - b| everywhere. The steepest place found by
+  /// climbing from random starts within 250 mm, over 300 seeds, has 1.51; within 60 mm of the bone 1.39.
+  static constexpr double kLipschitz = 1.6;
 
   /// Distance in mm to the surface point that is found nearest, negative inside bone. Within 2 mm of the surface this
   /// is the true distance to 1e-6 mm except near the medial axis; farther away it is an upper bound. Use it to measure.

@@ -9,7 +9,7 @@
 namespace spinaltap::phantom {
 namespace {
 
-constexpr std::uint64_t kGoldenHash1 = 1234482016650530493ULL, kGoldenHash1Osteoporotic = 9809589978547268987ULL;
+constexpr std::uint64_t kGoldenHash1 = 10260478036511288180ULL, kGoldenHash1Osteoporotic = 9922078761963903463ULL;
 
 std::uint64_t hashOf(const volume::CtVolume& ct) {
   std::uint64_t hash = 0;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -105,17 +106,23 @@ TEST(PhantomShape, ItsSlopeNeverExceedsTheStatedBound) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const Anatomy an = Anatomy::make(seed);
     Random random(seed + 100);
-    for (int n = 0; n < 8000; ++n) {
-      const Vec3 a = anywhere(random);
+    Vec3 steep_place;
+    double steep = 0;
+    for (int n = 0; n < 9000; ++n) {
+      // A third anywhere near the bone, a third anywhere in the scanner, and a third climbing from the steepest so far.
+      Vec3 a = anywhere(random);
+      if (n % 3 == 1) a *= 4.0;
+      if (n % 3 == 2) a = steep_place + (anywhere(random) - anywhere(random)) * 0.02;
       // Steps from a hundredth of a millimetre, where the steepest place shows, to several millimetres.
       const double reach = 0.01 * std::pow(10.0, random.uniform(0.0, 2.7));
       const Vec3 b = a + Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * reach;
       const double slope = std::fabs(boneDistance(an, a) - boneDistance(an, b)) / norm(a - b);
-      steepest = std::max(steepest, slope);
+      if (slope > steep) steep = slope, steep_place = a;
       ASSERT_LE(slope, Phantom::kLipschitz) << "seed " << seed << " point " << n;
     }
+    steepest = std::max(steepest, steep);
   }
-  EXPECT_GT(steepest, 0.9 * 1.1) << "a bound that is never approached wastes every cull made with it";
+  EXPECT_GT(steepest, 1.1) << "a bound that is never approached wastes every cull made with it";
 }
 
 TEST(PhantomShape, GradientsAreFiniteEverywhereAndPointOutOfBone) {
