@@ -6,6 +6,7 @@
 #include "core/volume/sample.h"
 #include "core/wire/point_volume_message.h"
 #include "server/jobs/case_files.h"
+#include "server/jobs/local_bound.h"
 #include "server/store/rows.h"
 
 namespace spinaltap::jobs {
@@ -17,11 +18,16 @@ Result<point_volume::PointVolume> buildPoints(store::Store& store, const store::
   if (!model) return tl::unexpected(model.error());
   const auto roi = loadRoi(store, row);
   if (!roi) return tl::unexpected(roi.error());
-  const Field field = rbf::asField(*model, lipschitzOf(*model));
+  const Frame frame = plan::pathFrame(path);
+  const double first_z_mm = lattice.discZ_mm(0), last_z_mm = lattice.discZ_mm(lattice.discs - 1);
+  // a little wider than the points, so that rounding puts none outside
+  const Cylinder around{frame, lattice.rings * lattice.spacing_mm, first_z_mm - lattice.spacing_mm,
+                        last_z_mm + lattice.spacing_mm};
+  const Field field = rbf::asField(*model, lipschitzIn(*model, around));
   const auto hu = [&roi](std::span<const Vec3> points, std::span<double> out) {
     for (std::size_t i = 0; i < points.size(); ++i) out[i] = volume::sampleHu(*roi, points[i]);
   };
-  return point_volume::buildVolume(lattice, plan::pathFrame(path), field, hu);
+  return point_volume::buildVolume(lattice, frame, field, hu);
 }
 
 }  // namespace

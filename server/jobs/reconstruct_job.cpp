@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/mesh/parts.h"
 #include "core/mesh/polygonise.h"
 #include "core/surface/surface.h"
 #include "core/volume/crop.h"
@@ -88,9 +89,10 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
   const double fit_s = watch.lap_s();
 
   const Field field = rbf::asField(fit->model, lipschitzOf(fit->model));
-  const auto mesh = mesh::polygonise(field, points->positions_patient,
-                                     meshOptions(points->positions_patient, job.cell_mm), stage(progress, "mesh"));
-  if (!mesh) return tl::unexpected(mesh.error());
+  const auto all_parts = mesh::polygonise(field, points->positions_patient,
+                                          meshOptions(points->positions_patient, job.cell_mm), stage(progress, "mesh"));
+  if (!all_parts) return tl::unexpected(all_parts.error());
+  const mesh::TriangleMesh mesh = mesh::largestPart(*all_parts);  // coarse scans leave specks
   const double mesh_s = watch.lap_s();
 
   Figures figures{{"case_id", row->id},
@@ -103,14 +105,14 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
                   {"reached_tolerance", fit->report.reached_tolerance},
                   {"tolerance_mm", job.tolerance_mm},
                   {"sum_abs_weights", fit->report.sum_abs_weights},
-                  {"vertices", mesh->vertices.size()},
-                  {"triangles", mesh->triangles.size()},
+                  {"vertices", mesh.vertices.size()},
+                  {"triangles", mesh.triangles.size()},
                   {"roi_dims", region->ct.grid.dims},
                   {"boundary_s", boundary_s},
                   {"fit_s", fit_s},
                   {"mesh_s", mesh_s},
                   {"total_s", total.lap_s()}};
-  const auto kept = keep(store, row->id, region->ct, fit->model, *mesh, figures);
+  const auto kept = keep(store, row->id, region->ct, fit->model, mesh, figures);
   if (!kept) return tl::unexpected(kept.error());
   return figures;
 }
