@@ -245,7 +245,7 @@ describe("a drill", () => {
 
 describe("a replay", () => {
   test("is verified, and plays the drill again", async () => {
-    await page.locator(".finished").getByText("Replay").click();
+    await page.locator(".finished").getByRole("link", { name: "Replay" }).click();
     await page.locator('[data-verified="true"]').waitFor();
     const slider = page.getByLabel("Moment, in cycles");
     const last = Number(await slider.getAttribute("max"));
@@ -288,6 +288,26 @@ describe("a replay", () => {
   });
 });
 
+describe("the README's picture", () => {
+  const file = process.env.SPINALTAP_SCREENSHOT;
+  test.skipIf(!file)("is made again", async () => {
+    const { page: large } = await openPage(browser, 1440, 900);
+    await large.goto(`${served.address}/#/`);
+    await large.locator(".case-card").first().click();
+    await large.getByText("Drill this path").click();
+    await large.locator('[data-agreement="agrees"]').waitFor();
+    await large.getByLabel("Feed").selectOption("5");
+    await large.getByRole("button", { name: "Cut-away" }).click();
+    await large.keyboard.down("KeyW");
+    const depth = large.locator('[data-reading="Depth"]');
+    while (Number(await depth.textContent()) < 20) await large.waitForTimeout(100);
+    await large.keyboard.up("KeyW");
+    await large.waitForTimeout(3000);
+    await large.screenshot({ path: resolve(top, file!), timeout: kSlow_ms });
+    await large.context().close();
+  });
+});
+
 describe("without the server", () => {
   test("a drill goes on alone, says so, and can be replayed here", async () => {
     await firstCase();
@@ -299,7 +319,7 @@ describe("without the server", () => {
     await until("bone is cut", async () => (await reading("Bone removed")) > 2);
     await page.keyboard.up("KeyW");
     await page.getByRole("button", { name: "Finish the drill" }).click();
-    await page.locator(".finished").getByText("Replay").click();
+    await page.locator(".finished").getByRole("link", { name: "Replay" }).click();
     await page.locator('[data-verified="true"]').waitFor();
     await page.unroute("**/api/v1/sessions");
     // The browser logs the request that the test cut.

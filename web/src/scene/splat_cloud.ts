@@ -16,11 +16,19 @@ import type { Lattice } from "../contract/bodies";
 import { kSplatFloats } from "../worker/core_api";
 import { type BoneUniforms, kClipping, kLighting, kSurfaceDensity } from "./shading";
 import { Slots } from "./slots";
+import type { SurfacePatch } from "./surface_patch";
 
 /** Position, normal, kind, density. */
 const kFloats = 8;
-/** A lattice of spacing h needs discs of 0.866 h for any tilt of the surface; a little more hides rounding. */
-const kRadiusPerSpacing = 0.95;
+/**
+ * A ball of 0.88 h about each exposed point leaves no gap (core/splats/splats.h); a disc is flat, and neighbours lie up to
+ * h before or behind one another, so seen along the surface a wider one is needed.
+ */
+const kRadiusPerSpacing = 1.5;
+/** Walls of the cut stand in rings, closer together; smaller discs stick out less over the hole's rim. */
+const kWallShare = 0.8;
+/** A point nearer to the mesh than this, in spacings, is drawn on it. */
+const kSnapPerSpacing = 2;
 
 const kVertex = /* glsl */ `
   in vec4 shade;  // normal, kind
@@ -30,13 +38,15 @@ const kVertex = /* glsl */ `
   flat out vec3 vCentre;
   flat out vec3 vNormal;
   flat out vec2 vLook;
+  flat out float vRadius;
   void main() {
+    vRadius = uRadius * mix(1.0, ${kWallShare}, shade.w);
     vec4 view = modelViewMatrix * vec4(position, 1.0);
     vCentre = view.xyz;
     vNormal = normalize(normalMatrix * shade.xyz);
     vLook = vec2(shade.w, density);
     gl_Position = projectionMatrix * view;
-    gl_PointSize = 2.2 * uRadius * projectionMatrix[1][1] * 0.5 * uViewport.y / max(0.1, -view.z) + 1.5;
+    gl_PointSize = 2.2 * vRadius * projectionMatrix[1][1] * 0.5 * uViewport.y / max(0.1, -view.z) + 1.5;
   }
 `;
 
@@ -45,7 +55,7 @@ const kFragment = /* glsl */ `
   flat in vec3 vCentre;
   flat in vec3 vNormal;
   flat in vec2 vLook;
-  uniform float uRadius;
+  flat in float vRadius;
   uniform vec2 uViewport;
   uniform mat4 uViewToWorld;
   uniform mat4 projectionMatrix;
@@ -59,7 +69,7 @@ const kFragment = /* glsl */ `
     if (abs(slope) < 1e-4) discard;
     vec3 p = ray * (dot(vCentre, vNormal) / slope);
     vec3 d = p - vCentre;
-    if (dot(d, d) > uRadius * uRadius) discard;
+    if (dot(d, d) > vRadius * vRadius) discard;
     if (isCutAway((uViewToWorld * vec4(p, 1.0)).xyz)) discard;
     vec4 clip = projectionMatrix * vec4(p, 1.0);
     gl_FragDepth = 0.5 * clip.z / clip.w + 0.5;
@@ -90,8 +100,8 @@ export class SplatCloud extends Points<BufferGeometry, ShaderMaterial> {
   constructor(
     private readonly lattice: Lattice,
     private readonly density_of: (index: number) => number,
-    /** The outer surface's normal at a place, path frame; null where the points' own must do. */
-    private readonly outer_normal: (x: number, y: number, z: number) => [number, number, number] | null,
+    /** The outer surface, path frame; null where the points' own positions and normals must do. */
+    private readonly surface: SurfacePatch | null,
     uniforms: BoneUniforms,
   ) {
     const capacity = capacityOf(lattice);
@@ -160,8 +170,17 @@ export class SplatCloud extends Points<BufferGeometry, ShaderMaterial> {
     for (let f = 0; f < kSplatFloats; ++f) this.data[to + f] = rows[at + f]!;
     const is_outer = rows[at + 6] === 0;
     this.data[to + 7] = is_outer ? kSurfaceDensity : this.density_of(index);
-    const normal = is_outer ? this.outer_normal(rows[at]!, rows[at + 1]!, rows[at + 2]!) : null;
-    if (normal) this.data.set(normal, to + 3);
+    if (is_outer) this.layOnSurface(to);
+  }
+
+  /** The lattice's points stand in terraces beneath the surface; drawn on it, they close as it does. */
+  private layOnSurface(to: number): void {
+    const near = this.surface?.at(this.data[to]!, this.data[to + 1]!, this.data[to + 2]!);
+    if (!near || Math.abs(near.distance_mm) > kSnapPerSpacing * this.lattice.spacing_mm) return;
+    for (let a = 0; a < 3; ++a) {
+      this.data[to + a]! -= near.distance_mm * near.normal[a]!;
+      this.data[to + 3 + a] = near.normal[a]!;
+    }
   }
 
   private hide(index: number): void {

@@ -13,6 +13,7 @@ import {
   Mesh,
   MeshBasicMaterial,
   MeshStandardMaterial,
+  type Object3D,
   Quaternion,
   SphereGeometry,
   TorusGeometry,
@@ -29,6 +30,8 @@ import { kAccent } from "./shading";
 export class BitModel extends Group {
   private readonly metal: MeshStandardMaterial[];
   private readonly spin = new Group();
+  /** What hides the view down the bit. */
+  private readonly behind: Object3D[];
   /** Fat and unseen: what a pointer grabs. */
   readonly grip: Mesh;
 
@@ -45,7 +48,8 @@ export class BitModel extends Group {
       new Vector2(0, bit.length_mm),
     ];
     this.spin.add(upright(new Mesh(new LatheGeometry(outline, 48), steel)));
-    this.spin.add(flutes(radius, bit));
+    const spiral = flutes(radius, bit);
+    this.spin.add(spiral);
     const chuck = new Mesh(new CylinderGeometry(radius * 2.6, radius * 1.9, 12, 40), dark);
     chuck.position.z = -(bit.length_mm + 5);
     chuck.rotation.x = -Math.PI / 2;
@@ -59,6 +63,7 @@ export class BitModel extends Group {
     this.grip.position.z = -(bit.length_mm + 50) / 2;
     this.grip.rotation.x = -Math.PI / 2;
     this.grip.renderOrder = 100;
+    this.behind = [spiral, chuck, shaft];
     this.add(this.spin, chuck, shaft, this.grip);
   }
 
@@ -70,7 +75,9 @@ export class BitModel extends Group {
   turn(radians: number): void {
     this.spin.rotation.z += radians;
   }
+  /** Only a hint of the bit itself, to look along it. */
   setGhost(ghost: boolean): void {
+    for (const part of this.behind) part.visible = !ghost;
     for (const material of this.metal) {
       material.transparent = ghost;
       material.opacity = ghost ? 0.22 : 1;
@@ -113,7 +120,7 @@ function flutes(radius: number, bit: BitInfo): LineSegments {
 
 /** The planned hole, its axis, entry and target. Drawn in the path frame: entry at the origin, target on +z. */
 export class PathModel extends Group {
-  constructor(length_mm: number, diameter_mm: number, chosen: boolean) {
+  constructor(length_mm: number, diameter_mm: number, chosen: boolean, marks: boolean) {
     super();
     const colour = chosen ? kAccent.path : new Color(0x7f8b96);
     const radius = diameter_mm / 2;
@@ -126,13 +133,14 @@ export class PathModel extends Group {
     );
     hole.rotation.x = Math.PI / 2;
     hole.position.z = length_mm / 2;
-    this.add(ghost(hole, chosen ? 0.2 : 0.1));
+    this.add(ghost(hole, chosen && marks ? 0.2 : 0.1));
     this.add(...ring(radius, 0, chosen ? kAccent.entry : colour));
     this.add(...ring(radius, length_mm, chosen ? kAccent.target : colour));
-    this.add(
-      ...ball(0, chosen ? kAccent.entry : colour),
-      ...ball(length_mm, chosen ? kAccent.target : colour),
-    );
+    if (marks)
+      this.add(
+        ...ball(0, chosen ? kAccent.entry : colour),
+        ...ball(length_mm, chosen ? kAccent.target : colour),
+      );
   }
   override dispose(): void {
     disposeTree(this);
@@ -152,7 +160,7 @@ function ghost<T extends Mesh | LineSegments>(object: T, opacity: number): T {
 
 function ring(radius: number, z: number, colour: Color): Mesh[] {
   const make = (): Mesh => {
-    const mesh = new Mesh(new TorusGeometry(radius, 0.09, 10, 64), new MeshBasicMaterial({ color: colour }));
+    const mesh = new Mesh(new TorusGeometry(radius, 0.06, 10, 64), new MeshBasicMaterial({ color: colour }));
     mesh.position.z = z;
     return mesh;
   };
@@ -161,7 +169,7 @@ function ring(radius: number, z: number, colour: Color): Mesh[] {
 
 function ball(z: number, colour: Color): Mesh[] {
   const make = (): Mesh => {
-    const mesh = new Mesh(new SphereGeometry(0.55, 20, 14), new MeshBasicMaterial({ color: colour }));
+    const mesh = new Mesh(new SphereGeometry(0.4, 20, 14), new MeshBasicMaterial({ color: colour }));
     mesh.position.z = z;
     return mesh;
   };

@@ -12,11 +12,12 @@ import { Bone } from "./bone";
 import { SectionCap } from "./section_cap";
 import { SplatCloud } from "./splat_cloud";
 import { Stage } from "./stage";
-import { SurfaceNormals } from "./surface_normals";
+import { SurfacePatch } from "./surface_patch";
 import { BitModel, GuidePlanes, PathModel } from "./tools";
 
-/** Splats reach past the outermost ring; the mesh begins again inside their reach, so no gap is left. */
-const kSeam = 0.35;
+/** The mesh goes on this many spacings into the modelled cylinder: its outermost points count as hidden by bone beyond
+ * them, so that a surface which leaves the cylinder at a grazing angle has no points of its own there. */
+const kSeam = 1.5;
 
 export class VertebraScene {
   readonly stage: Stage;
@@ -61,15 +62,15 @@ export class VertebraScene {
     this.stage.dispose();
   }
 
-  /** Every path of the case, the chosen one bright, with the bit standing before its entry. */
-  showPaths(paths: PathInfo[], chosen: PathInfo | null): void {
+  /** Every path of the case, the chosen one bright, with the bit standing before its entry. `marks`: balls at the ends. */
+  showPaths(paths: PathInfo[], chosen: PathInfo | null, marks = true): void {
     for (const group of [...this.path_groups.children]) {
       (group.children[0] as PathModel).dispose();
       this.path_groups.remove(group);
     }
     for (const path of paths) {
       const group = this.stage.pathGroup(path.frame);
-      group.add(new PathModel(path.length_mm, path.bit.diameter_mm, path.id === chosen?.id));
+      group.add(new PathModel(path.length_mm, path.bit.diameter_mm, path.id === chosen?.id, marks));
       this.path_groups.add(group);
     }
     this.choose(chosen);
@@ -114,22 +115,22 @@ export class VertebraScene {
     const path = this.path!;
     this.splats?.dispose();
     const radius = (body.lattice.rings - 1) * body.lattice.spacing_mm;
-    const normals = this.data.mesh ? new SurfaceNormals(this.data.mesh, path.frame, radius) : null;
+    const surface = this.data.mesh ? new SurfacePatch(this.data.mesh, path.frame, radius) : null;
     this.splats = new SplatCloud(
       body.lattice,
       (index) => body.density_mg_cm3[index]!,
-      (x, y, z) => normals?.at(x, y, z) ?? null,
+      surface,
       this.stage.bone,
     );
     this.path_group!.add(this.splats);
     const { spacing_mm, rings, discs, first_disc } = body.lattice;
-    const slack = kSeam * spacing_mm;
+    const seam = kSeam * spacing_mm;
     const low = first_disc * spacing_mm;
     this.stage.bone.uToPath.value.copy(this.stage.pathMatrix(path.frame)).invert();
     this.stage.bone.uCylinder.value.set(
-      (rings - 1) * spacing_mm + slack,
-      low - slack,
-      low + (discs - 1) * spacing_mm + slack,
+      (rings - 1) * spacing_mm - seam,
+      low + seam,
+      low + (discs - 1) * spacing_mm - seam,
     );
     this.lattice = body.lattice;
     this.setAlive(body.alive);
@@ -145,6 +146,11 @@ export class VertebraScene {
     if (!this.guides) return;
     this.guides.visible = point !== null;
     if (point) this.guides.setPoint(point);
+    this.stage.invalidate();
+  }
+
+  setPlan(shown: boolean): void {
+    this.path_groups.visible = shown;
     this.stage.invalidate();
   }
 
@@ -182,7 +188,7 @@ export class VertebraScene {
     if (across.x * outward < 0) across.negate();
     across.normalize().add(new Vector3(0, 0, 0.55));
     const middle = this.stage.place(toPatient(path.frame, [0, 0, path.length_mm * 0.42]));
-    this.stage.lookAlong(across, middle, 105);
+    this.stage.lookAlong(across, middle, 112);
   }
 
   /** Near the entry, over the shoulder of the hand that drills. */

@@ -40,22 +40,25 @@ function drawChart(canvas: HTMLCanvasElement, { series, x, y, rules, cursor }: C
   const g = canvas.getContext("2d")!;
   g.setTransform(ratio, 0, 0, ratio, 0, 0);
   g.clearRect(0, 0, width, height);
-  const high = niceHigh(Math.max(y.least_high, largestY(series.points)));
+  const most = Math.max(y.least_high, largestY(series.points));
+  const tick = niceStep(most / 4);
+  const high = Math.ceil(most / tick - 1e-9) * tick;
   const px = (v: number): number =>
     kMargin.left + ((v - x.low) / (x.high - x.low)) * (width - kMargin.left - kMargin.right);
   const py = (v: number): number =>
     height - kMargin.bottom - (v / high) * (height - kMargin.top - kMargin.bottom);
-  drawGrid(g, x, y, high, px, py, width);
+  drawGrid(g, x, y, { tick, high }, px, py, width);
   for (const rule of rules ?? []) drawRule(g, rule, px(rule.at), height);
   drawLine(g, series.points, px, py);
-  if (cursor) drawCursor(g, px(cursor[0]), py(cursor[1]), height);
+  if (cursor && cursor[0] >= x.low && cursor[0] <= x.high)
+    drawCursor(g, px(cursor[0]), py(cursor[1]), height);
 }
 
 function drawGrid(
   g: CanvasRenderingContext2D,
   x: ChartProps["x"],
   y: ChartProps["y"],
-  high: number,
+  { tick, high }: { tick: number; high: number },
   px: (v: number) => number,
   py: (v: number) => number,
   width: number,
@@ -64,15 +67,15 @@ function drawGrid(
   g.lineWidth = 1;
   g.textBaseline = "middle";
   g.textAlign = "right";
-  for (let i = 0; i <= 2; ++i) {
-    const v = (high * i) / 2;
-    g.strokeStyle = i === 0 ? "#3b4854" : "#222c35";
+  for (let v = 0; v <= high * (1 + 1e-9); v += tick) {
+    const at = Math.round(py(v)) + 0.5;
+    g.strokeStyle = v === 0 ? "#3b4854" : "#222c35";
     g.beginPath();
-    g.moveTo(kMargin.left, Math.round(py(v)) + 0.5);
-    g.lineTo(width - kMargin.right, Math.round(py(v)) + 0.5);
+    g.moveTo(kMargin.left, at);
+    g.lineTo(width - kMargin.right, at);
     g.stroke();
     g.fillStyle = "#9aa7b3";
-    g.fillText(v.toFixed(high < 4 ? 1 : 0), kMargin.left - 6, py(v));
+    g.fillText(String(Math.round(v * 100) / 100), kMargin.left - 6, at);
   }
   g.textBaseline = "alphabetic";
   g.textAlign = "center";
@@ -141,8 +144,4 @@ function largestY(points: number[]): number {
 export function niceStep(v: number): number {
   const power = 10 ** Math.floor(Math.log10(v));
   return ([1, 2, 5, 10].find((m) => m * power >= v * (1 - 1e-9)) ?? 10) * power;
-}
-
-function niceHigh(v: number): number {
-  return niceStep(v / 2) * 2;
 }

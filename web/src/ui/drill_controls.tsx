@@ -44,7 +44,7 @@ export function DrillControls({ hand, tell, session }: ControlsProps) {
         <Pad
           shape="round"
           label="Sideways"
-          ends={["Side", "ways"]}
+          ends={["Sideways", ""]}
           onPush={(value) => tell({ type: "pad_sideways", value })}
         />
         <Pad
@@ -75,7 +75,7 @@ const kHelp: [string[], string][] = [
   [["↑", "↓", "←", "→"], "sideways"],
   [["Q", "E", "R", "F"], "lean"],
   [["Shift"], "fine"],
-  [["Space"], "spin on, off"],
+  [["Space"], "spin"],
 ];
 
 function KeyHelp() {

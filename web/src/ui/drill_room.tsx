@@ -122,7 +122,9 @@ function DrillPicture({ opened, session, hand, tell }: PictureProps) {
   const glass = useSignal(false);
   const cut_away = useSignal(false);
   const ghost = useSignal(false);
+  const plan = useSignal(true);
   useSignalEffect(() => scene.current?.setGlass(glass.value));
+  useSignalEffect(() => scene.current?.setPlan(plan.value));
   useSignalEffect(() => {
     scene.current?.setCutAway(cut_away.value);
     session.watchAlive(cut_away.value);
@@ -137,7 +139,7 @@ function DrillPicture({ opened, session, hand, tell }: PictureProps) {
   const ready = (made: VertebraScene): (() => void) => {
     scene.current = made;
     made.setGuides(null);
-    made.showPaths([path], path);
+    made.showPaths([path], path, false);
     made.openPointVolume(body);
     made.lookAtEntry();
     session.onSplats = (change) => made.change(change);
@@ -178,6 +180,7 @@ function DrillPicture({ opened, session, hand, tell }: PictureProps) {
           </button>
           <Toggle text="Glass bone" on={glass} />
           <Toggle text="Ghost bit" on={ghost} />
+          <Toggle text="Plan" on={plan} />
         </div>
         <OutsideNote session={session} path={path} />
       </SceneView>

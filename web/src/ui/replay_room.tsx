@@ -137,7 +137,9 @@ function ReplayPicture({ opened, session }: { opened: Opened; session: ReplaySes
   const glass = useSignal(false);
   const cut_away = useSignal(true);
   const ghost = useSignal(false);
+  const plan = useSignal(true);
   useSignalEffect(() => scene.current?.setGlass(glass.value));
+  useSignalEffect(() => scene.current?.setPlan(plan.value));
   useSignalEffect(() => scene.current?.setCutAway(cut_away.value));
   useSignalEffect(() => scene.current?.bit?.setGhost(ghost.value));
   useSignalEffect(() => {
@@ -147,7 +149,7 @@ function ReplayPicture({ opened, session }: { opened: Opened; session: ReplaySes
   const ready = (made: VertebraScene): (() => void) => {
     scene.current = made;
     made.setGuides(null);
-    made.showPaths([path], path);
+    made.showPaths([path], path, false);
     made.openPointVolume(body);
     made.setCutAway(cut_away.value);
     made.lookAcrossPath();
@@ -178,6 +180,7 @@ function ReplayPicture({ opened, session }: { opened: Opened; session: ReplaySes
         <Toggle text="Cut-away" on={cut_away} />
         <Toggle text="Glass bone" on={glass} />
         <Toggle text="Ghost bit" on={ghost} />
+        <Toggle text="Plan" on={plan} />
       </div>
     </SceneView>
   );
@@ -240,11 +243,7 @@ function Readings({ session, opened }: { session: ReplaySession; opened: Opened 
       <Reading name="Depth" value={(pose?.depth_mm ?? 0).toFixed(2)} unit="mm" />
       <Reading name="Thrust" value={(pose?.thrust_N ?? 0).toFixed(2)} unit="N" />
       <Reading name="Bone removed" value={((pose?.removed_total ?? 0) * volume).toFixed(1)} unit="mm³" />
-      <Reading
-        name="Cycle"
-        value={session.cycle.value.toLocaleString("en")}
-        unit={`of ${session.cycles.value.toLocaleString("en")}`}
-      />
+      <Reading name="Cycle" value={session.cycle.value.toLocaleString("en")} unit="" />
     </dl>
   );
 }

@@ -1,5 +1,7 @@
-// The mesh's smooth normals, asked for at any place near it. The points along the path know their own normals only to
-// some degrees (they see a few neighbours); the mesh knows the implicit surface's. Pure.
+// The mesh along the path as a smooth surface that can be asked at any place near it. Points of the lattice lie up to a
+// spacing beneath the bone's surface and know its normal only to some degrees; the mesh knows where it really is.
+// After: the moving least squares of points with normals, e.g. C. Shen et al., "Interpolating and Approximating Implicit
+// Surfaces from Polygon Soup", SIGGRAPH 2004 (the constant-normal form, weights by distance). Pure.
 import type { MeshBody, Vec3 } from "../contract/bodies";
 import type { PathFrame } from "../contract/rest";
 import { directionToLocal, toLocal } from "../geometry/vec";
@@ -7,7 +9,14 @@ import { directionToLocal, toLocal } from "../geometry/vec";
 /** Vertices count up to this far away, the near ones most. */
 const kReach_mm = 1.2;
 
-export class SurfaceNormals {
+export interface SurfacePoint {
+  /** Unit, outward. */
+  normal: Vec3;
+  /** How far the asked place lies outside the surface; negative inside. */
+  distance_mm: number;
+}
+
+export class SurfacePatch {
   /** Six numbers a vertex, path frame: position, normal. */
   private readonly cells = new Map<string, number[]>();
 
@@ -27,30 +36,43 @@ export class SurfaceNormals {
   }
 
   /** Path frame; null when no vertex is near. */
-  at(x: number, y: number, z: number): Vec3 | null {
+  at(x: number, y: number, z: number): SurfacePoint | null {
     const [i, j, k] = cellOf(x, y, z);
-    const sum: Vec3 = [0, 0, 0];
+    const sum: Sum = { normal: [0, 0, 0], distance: 0, weight: 0 };
     for (let di = -1; di <= 1; ++di) {
       for (let dj = -1; dj <= 1; ++dj) {
         for (let dk = -1; dk <= 1; ++dk)
           addCell(this.cells.get([i + di, j + dj, k + dk].join()), x, y, z, sum);
       }
     }
-    const size = Math.hypot(...sum);
-    return size < 1e-9 ? null : [sum[0] / size, sum[1] / size, sum[2] / size];
+    const size = Math.hypot(...sum.normal);
+    if (size < 1e-9) return null;
+    const normal = sum.normal.map((v) => v / size) as Vec3;
+    return { normal, distance_mm: sum.distance / sum.weight };
   }
+}
+
+interface Sum {
+  normal: Vec3;
+  distance: number;
+  weight: number;
 }
 
 function cellOf(x: number, y: number, z: number): Vec3 {
   return [Math.floor(x / kReach_mm), Math.floor(y / kReach_mm), Math.floor(z / kReach_mm)];
 }
 
-function addCell(cell: number[] | undefined, x: number, y: number, z: number, sum: Vec3): void {
+function addCell(cell: number[] | undefined, x: number, y: number, z: number, sum: Sum): void {
   if (!cell) return;
   for (let at = 0; at < cell.length; at += 6) {
-    const d2 = (cell[at]! - x) ** 2 + (cell[at + 1]! - y) ** 2 + (cell[at + 2]! - z) ** 2;
+    const dx = x - cell[at]!;
+    const dy = y - cell[at + 1]!;
+    const dz = z - cell[at + 2]!;
+    const d2 = dx * dx + dy * dy + dz * dz;
     if (d2 >= kReach_mm ** 2) continue;
     const weight = (1 - d2 / kReach_mm ** 2) ** 4 / (d2 + 0.02);
-    for (let a = 0; a < 3; ++a) sum[a] = sum[a]! + weight * cell[at + 3 + a]!;
+    sum.weight += weight;
+    sum.distance += weight * (dx * cell[at + 3]! + dy * cell[at + 4]! + dz * cell[at + 5]!);
+    for (let a = 0; a < 3; ++a) sum.normal[a] = sum.normal[a]! + weight * cell[at + 3 + a]!;
   }
 }
