@@ -35,8 +35,13 @@ stop() { kill -TERM "$server"; wait "$server" || fail "the server ended with $?"
 start
 [ "$(wc -l <"$work/out")" = 1 ] || fail "run.sh prints more than one line on standard output"
 [ -z "$(grep -F "$PWD" "$work/out")" ] || fail "the line names a path of the machine"
-SPINALTAP_URL=$address npm --prefix web run --silent e2e
+node --input-type=module -e 'const at = process.argv[1];
+  const page = await (await fetch(at)).text();
+  const { cases } = await (await fetch(new URL("/api/v1/cases", at))).json();
+  if (!page.includes("<script") || cases.length !== 1 || cases[0].paths !== 2) throw new Error("no page, or no ready case");
+' "$address" || fail "the address shows no page with a ready case"
 stop
+SPINALTAP_E2E_DATA=$work/data npm --prefix web run --silent e2e
 start   # the second start finds the case and rebuilds nothing
 grep -q 'preparing a demonstration case' "$work/err" && fail "a second start makes the case again"
 stop
