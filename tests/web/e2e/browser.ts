@@ -58,6 +58,8 @@ export interface Look {
   bright: number;
   /** Share of pixels that are not within 6 of the commonest grey. */
   busy: number;
+  /** Share of pixels as red as opened marrow; the bone's outside never is. */
+  marrow: number;
 }
 
 /** What an element looks like, from a picture of the page: drawn pixels, not promises. */
@@ -71,7 +73,9 @@ export async function lookAt(page: Page, element: Locator): Promise<Look> {
     context.drawImage(image, 0, 0);
     const { data } = context.getImageData(0, 0, image.width, image.height);
     const counts = new Array<number>(256).fill(0);
+    let red = 0;
     for (let i = 0; i < data.length; i += 4) {
+      red += Number(data[i]! - data[i + 2]! > 55);
       counts[Math.round(0.3 * data[i]! + 0.59 * data[i + 1]! + 0.11 * data[i + 2]!)]! += 1;
     }
     const pixels = data.length / 4;
@@ -84,6 +88,7 @@ export async function lookAt(page: Page, element: Locator): Promise<Look> {
       deviation: Math.sqrt(sum((grey) => (grey - mean) ** 2)),
       bright: sum((grey) => Number(grey > 160)),
       busy: sum((grey) => Number(Math.abs(grey - commonest) > 6)),
+      marrow: red / pixels,
     };
   }, png.toString("base64"));
 }

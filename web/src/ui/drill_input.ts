@@ -93,7 +93,7 @@ function attachPointer(scene: VertebraScene, { nudge }: HandLine): () => void {
     if (!scene.isOnBit(event)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    nudge([0, 0, Math.sign(event.deltaY) * -kNotch_mm]);
+    nudge([0, 0, Math.sign(event.deltaY) * kNotch_mm]);
   };
   const capture = { capture: true };
   canvas.addEventListener("pointerdown", down, capture);
