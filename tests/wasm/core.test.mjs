@@ -151,6 +151,26 @@ test("poses and series are those of the session", () => {
   session.delete();
 });
 
+const countBits = (words) =>
+  words.reduce((sum, word) => {
+    let count = 0;
+    for (let rest = word; rest !== 0; rest &= rest - 1) ++count;
+    return sum + count;
+  }, 0);
+
+test("alive bits are those of the points that are left, live and at any cycle of a player", () => {
+  const states = [];
+  const session = drill(200, (live, result) => result.status === 0 && states.push(live.aliveBits()));
+  assert.equal(countBits(states.at(-1)), session.pointsAlive());
+  const player = new core.Player(session.recordingBytes());
+  for (const cycle of [150, 3, states.length]) {
+    player.seek(cycle);
+    assert.deepEqual(player.aliveBits(), states[cycle - 1]);
+  }
+  player.delete();
+  session.delete();
+});
+
 test("metrics come as one JSON object with units in the keys", () => {
   const session = drill(300);
   const metrics = JSON.parse(session.metricsJson());
