@@ -96,13 +96,16 @@ Result<void> FrameReader::feed(std::span<const std::byte> bytes) {
   std::size_t used = 0;
   while (true) {
     wire::ByteReader in(std::span<const std::byte>(pending_).subspan(used));
-    const auto type = static_cast<FrameType>(in.u8());
+    const std::uint8_t type = in.u8();
     const std::uint32_t length = in.u32();
     if (in.failed()) break;
     if (length > kMaxFrameBytes) return fail(ErrorCode::Corrupt, "the importer sent an oversized frame");
     const std::span<const std::byte> payload = in.raw(length);
     if (in.failed()) break;
-    if (auto done = frame(type, payload); !done) return done;
+    if (type < static_cast<std::uint8_t>(FrameType::Accepted) || type > static_cast<std::uint8_t>(FrameType::Refused)) {
+      return fail(ErrorCode::Corrupt, "the importer sent a frame of an unknown kind");
+    }
+    if (auto done = frame(static_cast<FrameType>(type), payload); !done) return done;
     used += in.offset();
   }
   pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(used));
@@ -128,7 +131,7 @@ Result<void> FrameReader::frame(FrameType type, std::span<const std::byte> paylo
       refuse(payload);
       return {};
   }
-  return fail(ErrorCode::Corrupt, "the importer sent a frame of an unknown kind");
+  return {};
 }
 
 Result<void> FrameReader::accepted(std::span<const std::byte> payload) {

@@ -91,7 +91,7 @@ Result<RawHeader> readRaw(ByteSource& source, const std::string& name) {
     }
     RawHeader raw = fieldsOf<nifti_1_header, std::int16_t, float, std::int16_t>(bytes, swapped);
     raw.vox_offset = Fields(bytes, swapped).at<float>(offsetof(nifti_1_header, vox_offset));
-    raw.units = Fields(bytes, swapped).at<char>(offsetof(nifti_1_header, xyzt_units));
+    raw.units = Fields(bytes, swapped).at<std::uint8_t>(offsetof(nifti_1_header, xyzt_units));
     return raw;
   }
   if (size != 540) return no("not a NIfTI file");

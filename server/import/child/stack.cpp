@@ -45,16 +45,19 @@ Result<void> checkAllAlike(const std::vector<Slice>& slices) {
 
 std::vector<Placed> sortAlong(const std::vector<Slice>& slices, const Vec3& normal) {
   std::vector<Placed> placed;
+  placed.reserve(slices.size());
   for (std::size_t i = 0; i < slices.size(); ++i) {
     placed.push_back({i, dot(slices[i].position_patient - slices.front().position_patient, normal)});
   }
-  std::stable_sort(placed.begin(), placed.end(),
-                   [](const Placed& a, const Placed& b) { return a.along_mm < b.along_mm; });
+  std::sort(placed.begin(), placed.end(), [](const Placed& a, const Placed& b) {
+    return a.along_mm != b.along_mm ? a.along_mm < b.along_mm : a.slice < b.slice;
+  });
   return placed;
 }
 
 double medianStep(const std::vector<Placed>& placed) {
   std::vector<double> steps;
+  steps.reserve(placed.size());
   for (std::size_t k = 1; k < placed.size(); ++k) steps.push_back(placed[k].along_mm - placed[k - 1].along_mm);
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());
@@ -170,6 +173,7 @@ Result<Stack> arrangeStack(const std::vector<Slice>& slices, const StackOptions&
   if (auto straight = checkLattice(slices, placed, normal, step); !straight) return tl::unexpected(straight.error());
 
   Stack stack;
+  stack.order.reserve(placed.size());
   for (const Placed& p : placed) stack.order.push_back(p.slice);
   stack.grid = gridOf(slices[stack.order.front()], slices.size(), step);
   return stack;
