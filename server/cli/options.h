@@ -35,7 +35,8 @@ struct SegmentOptions {
 struct ReconstructOptions {
   std::string data, case_id;
   double sample_spacing_mm = surface::kSampleSpacing_mm, tolerance_mm = surface::kFitTolerance_mm;
-  double smoothing_mm = surface::kSmoothing_mm, cell_mm = surface::kCell_mm;
+  std::optional<double> smoothing_mm;
+  double cell_mm = surface::kCell_mm;
   std::size_t max_centres = surface::kMaxCentres;
 };
 

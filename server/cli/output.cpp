@@ -20,7 +20,7 @@ void printRows(const jobs::Figures& rows) {
   for (const auto& row : rows) {
     std::string line;
     for (const auto& [key, value] : row.items()) {
-      if (value.is_primitive()) line += (line.empty() ? "  " : "  ") + key + "=" + shown(value);
+      if (value.is_primitive()) line += "  " + key + "=" + shown(value);
     }
     std::puts(line.c_str());
   }

@@ -98,8 +98,9 @@ void addReconstruct(Program& program) {
   sub->add_option("--sample-spacing", o->sample_spacing_mm, "Between boundary points, mm")->capture_default_str();
   sub->add_option("--tolerance", o->tolerance_mm, "Centres are added until samples are met this closely, mm")
       ->capture_default_str();
-  sub->add_option("--smoothing", o->smoothing_mm, "Averages the samples' noise, mm; 0 interpolates")
-      ->capture_default_str();
+  sub->add_option(
+      "--smoothing", o->smoothing_mm,
+      "Averages the samples' noise, mm; 0 interpolates (default: 0.2 for voxels up to 0.5 mm, more for wider)");
   sub->add_option("--max-centres", o->max_centres, "No more centres than this")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

@@ -24,10 +24,11 @@ Result<Figures> importCase(store::Store& store, const ImportJob& job, const Prog
   const auto ct = store.blobs().put(encodeCt(imported->ct));
   if (!ct) return tl::unexpected(ct.error());
   row.ct = *ct;
-  if (imported->label) {
-    const auto label = store.blobs().put(encodeLabel(*imported->label));
-    if (!label) return tl::unexpected(label.error());
-    row.label_blob = *label;
+  const std::optional<volume::LabelVolume>& label = imported->label;
+  if (label) {
+    const auto blob = store.blobs().put(encodeLabel(*label));
+    if (!blob) return tl::unexpected(blob.error());
+    row.label_blob = *blob;
     row.label_source = "imported";
   }
   const auto kept = store.addCase(row);
@@ -42,8 +43,8 @@ Result<Figures> importCase(store::Store& store, const ImportJob& job, const Prog
                   {"voxels", row.grid.voxels()},
                   {"hu_min", *low},
                   {"hu_max", *high}};
-  if (imported->label) {
-    const auto& inside = imported->label->inside;
+  if (label) {
+    const auto& inside = label->inside;
     figures["label_voxels"] = std::count_if(inside.begin(), inside.end(), [](std::uint8_t v) { return v != 0; });
   }
   figures["notes"] = imported->notes;

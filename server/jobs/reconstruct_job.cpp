@@ -84,7 +84,8 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
   const double boundary_s = watch.lap_s();
 
   const rbf::Samples samples{std::move(signed_samples->positions), std::move(signed_samples->distances_mm)};
-  const auto fit = rbf::fit(samples, {job.tolerance_mm, job.smoothing_mm, job.max_centres}, stage(progress, "fit"));
+  const double smoothing_mm = job.smoothing_mm.value_or(surface::smoothingFor(region->ct.grid.spacing_mm));
+  const auto fit = rbf::fit(samples, {job.tolerance_mm, smoothing_mm, job.max_centres}, stage(progress, "fit"));
   if (!fit) return tl::unexpected(fit.error());
   const double fit_s = watch.lap_s();
 
@@ -104,6 +105,7 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
                   {"residual_rms_mm", fit->report.residual_rms_mm},
                   {"reached_tolerance", fit->report.reached_tolerance},
                   {"tolerance_mm", job.tolerance_mm},
+                  {"smoothing_mm", smoothing_mm},
                   {"sum_abs_weights", fit->report.sum_abs_weights},
                   {"vertices", mesh.vertices.size()},
                   {"triangles", mesh.triangles.size()},

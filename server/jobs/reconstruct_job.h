@@ -1,5 +1,6 @@
 // server/jobs/reconstruct_job.h - from a label to a smooth surface: boundary points, implicit function, mesh.
 #pragma once
+#include <optional>
 #include <string>
 
 #include "core/surface/defaults.h"
@@ -12,7 +13,7 @@ struct ReconstructJob {
   std::string case_id;
   double sample_spacing_mm = surface::kSampleSpacing_mm;
   double tolerance_mm = surface::kFitTolerance_mm;
-  double smoothing_mm = surface::kSmoothing_mm;
+  std::optional<double> smoothing_mm;  ///< default: surface::smoothingFor the stack's voxels
   std::size_t max_centres = surface::kMaxCentres;
   double cell_mm = surface::kCell_mm;
 };
@@ -21,7 +22,8 @@ struct ReconstructJob {
 inline constexpr double kRoiMargin_mm = 15;
 
 /// Figures: case_id, boundary_points, boundary_points_from_ct, samples, centres, residual_max_mm, residual_rms_mm,
-/// reached_tolerance, tolerance_mm, sum_abs_weights, vertices, triangles, roi_dims, boundary_s, fit_s, mesh_s, total_s.
+/// reached_tolerance, tolerance_mm, smoothing_mm, sum_abs_weights, vertices, triangles, roi_dims, boundary_s, fit_s,
+/// mesh_s, total_s.
 /// @error NotFound (no label yet), Limit (max_centres), and those of surface, rbf and mesh.
 [[nodiscard]] Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, const Progress& progress);
 

@@ -11,7 +11,7 @@ namespace {
 
 Result<volume::LabelVolume> makeLabel(store::Store& store, const store::Case& row, const SegmentJob& job) {
   if (!job.grow) {
-    const auto imported = loadLabel(store, row);
+    auto imported = loadLabel(store, row);
     if (!imported) return imported;
     return segment::largestIsland(*imported);
   }

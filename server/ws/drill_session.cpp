@@ -1,5 +1,6 @@
 #include "server/ws/drill_session.h"
 
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -124,7 +125,15 @@ Answer DrillSession::State::finish() {
 
 DrillSession::DrillSession(store::Store& store, Ticket ticket)
     : state_(new State{store, std::move(ticket), {}, false}) {}
-DrillSession::~DrillSession() { hangUp(); }
+
+DrillSession::~DrillSession() {
+  try {
+    hangUp();
+  } catch (const std::exception&) {
+    // out of memory: the recording stays in live/, and the next start brings it in
+    state_->ended = true;
+  }
+}
 
 Answer DrillSession::onMessage(std::span<const std::byte> bytes) {
   if (state_->ended) return {};

@@ -8,7 +8,7 @@
 
 namespace spinaltap::ws {
 
-class WorkerSet::Thread : public DrillWorker {
+class WorkerSet::Thread final : public DrillWorker {
  public:
   Thread(store::Store& store, const Ticket& ticket, WorkerCallbacks callbacks)
       : callbacks_(std::move(callbacks)), thread_([this, &store, ticket] { work(store, ticket); }) {}
