@@ -63,6 +63,6 @@ void evaluate(const Model& model, std::span<const Vec3> points_patient, std::spa
 void evaluateGradient(const Model& model, std::span<const Vec3> points_patient, std::span<Vec3> out);
 
 /// The model as a callback; the model is copied into it. `lipschitz` is what the caller can vouch for.
-[[nodiscard]] Field asField(Model model, double lipschitz);
+[[nodiscard]] Field asField(const Model& model, double lipschitz);
 
 }  // namespace spinaltap::rbf

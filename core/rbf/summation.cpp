@@ -133,7 +133,7 @@ void evaluateGradient(const Model& model, std::span<const Vec3> points_patient, 
   sumGradients(FlatModel(model), points_patient, out);
 }
 
-Field asField(Model model, double lipschitz) {
+Field asField(const Model& model, double lipschitz) {
   const auto flat = std::make_shared<const FlatModel>(model);
   Field field;
   field.values = [flat](std::span<const Vec3> p, std::span<double> out) { sumValues(*flat, p, out); };
