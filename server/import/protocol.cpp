@@ -4,35 +4,15 @@
 #include <utility>
 
 #include "core/wire/bytes.h"
+#include "server/import/grid_bytes.h"
 
 namespace spinaltap::importer {
-
 namespace {
 
 constexpr std::uint32_t kRequestMagic = 0x31495453;  // "STI1"
 
 std::string textOf(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-void writeGrid(wire::ByteWriter& out, const volume::Grid& grid) {
-  for (const int n : grid.dims) out.i32(n);
-  out.vec3(grid.spacing_mm);
-  out.vec3(grid.origin_patient);
-  out.vec3(grid.direction.col_x);
-  out.vec3(grid.direction.col_y);
-  out.vec3(grid.direction.col_z);
-}
-
-volume::Grid readGrid(wire::ByteReader& in) {
-  volume::Grid grid;
-  for (int& n : grid.dims) n = in.i32();
-  grid.spacing_mm = in.vec3();
-  grid.origin_patient = in.vec3();
-  grid.direction.col_x = in.vec3();
-  grid.direction.col_y = in.vec3();
-  grid.direction.col_z = in.vec3();
-  return grid;
 }
 
 }  // namespace

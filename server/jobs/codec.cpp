@@ -2,32 +2,13 @@
 
 #include "core/wire/body.h"
 #include "core/wire/volume_message.h"
+#include "server/import/grid_bytes.h"
 
 namespace spinaltap::jobs {
 namespace {
 
 constexpr std::uint32_t kLabelMagic = 0x314c5453;  // the bytes 'S' 'T' 'L' '1'
-constexpr std::uint32_t kModelMagic = 0x31525453;  // the bytes 'S' 'T' 'R' '1'
-
-void writeGrid(wire::ByteWriter& out, const volume::Grid& grid) {
-  for (const int dim : grid.dims) out.i32(dim);
-  out.vec3(grid.spacing_mm);
-  out.vec3(grid.origin_patient);
-  out.vec3(grid.direction.col_x);
-  out.vec3(grid.direction.col_y);
-  out.vec3(grid.direction.col_z);
-}
-
-volume::Grid readGrid(wire::ByteReader& in) {
-  volume::Grid grid;
-  for (int& dim : grid.dims) dim = in.i32();
-  grid.spacing_mm = in.vec3();
-  grid.origin_patient = in.vec3();
-  grid.direction.col_x = in.vec3();
-  grid.direction.col_y = in.vec3();
-  grid.direction.col_z = in.vec3();
-  return grid;
-}
+constexpr std::uint32_t kModelMagic = 0x31465453;  // the bytes 'S' 'T' 'F' '1'
 
 }  // namespace
 
@@ -61,7 +42,7 @@ std::vector<std::byte> encodeLabel(const volume::LabelVolume& label) {
   wire::ByteWriter out;
   out.u32(kLabelMagic);
   out.u32(1);
-  writeGrid(out, label.grid);
+  importer::writeGrid(out, label.grid);
   out.u32(static_cast<std::uint32_t>(runs.size()));
   for (const std::uint32_t run : runs) out.u32(run);
   return out.take();
@@ -71,7 +52,7 @@ Result<volume::LabelVolume> decodeLabel(std::span<const std::byte> bytes) {
   wire::ByteReader in(bytes);
   if (const auto read = wire::readPreamble(in, "label", kLabelMagic); !read) return tl::unexpected(read.error());
   volume::LabelVolume label;
-  label.grid = readGrid(in);
+  label.grid = importer::readGrid(in);
   const std::uint32_t runs = in.u32();
   if (in.failed() || in.left() != std::size_t{4} * runs) {
     return wire::corrupt("label", in.offset(), "its length does not fit");

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "server/store/blob_store.h"
 #include "server/store/ids.h"
 
 namespace spinaltap::jobs {
@@ -14,16 +15,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr auto kFlushEvery = std::chrono::seconds(1);
-
-bool writeAll(int handle, std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t n = ::write(handle, bytes.data(), bytes.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    bytes = bytes.subspan(static_cast<std::size_t>(n));
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -63,7 +54,7 @@ Result<RecordingFile> RecordingFile::begin(store::Store& store, const recording:
   }
   const int handle = state->handle;
   auto writer = recording::Writer::begin(
-      header, volume, [handle](std::span<const std::byte> bytes) { return writeAll(handle, bytes); });
+      header, volume, [handle](std::span<const std::byte> bytes) { return store::writeAll(handle, bytes); });
   if (!writer) {
     ::unlink(state->file.c_str());
     return tl::unexpected(writer.error());

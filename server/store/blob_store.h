@@ -18,6 +18,9 @@ using BlobId = std::string;  ///< 64 lower-case hex digits; empty means there is
 [[nodiscard]] bool isBlobId(std::string_view id);
 [[nodiscard]] BlobId blobIdOf(std::span<const std::byte> bytes);
 
+/// Every byte, past interruptions and short writes; false when the system refuses (errno says why).
+[[nodiscard]] bool writeAll(int handle, std::span<const std::byte> bytes);
+
 /// Called before each step of a write ("open", "write", "fsync", "rename", "fsync folder"); true makes the step fail.
 /// For tests only.
 using Fault = std::function<bool(std::string_view step)>;
