@@ -34,7 +34,7 @@ CLI::Validator oneOf(const std::vector<std::string_view>& names) {
 
 /// A subcommand with --json, that remembers what to run.
 template <class Options>
-CLI::App* add(Program& program, const char* name, const char* help, std::shared_ptr<Options> options,
+CLI::App* add(Program& program, const char* name, const char* help, const std::shared_ptr<Options>& options,
               Result<Outcome> (*run)(const Options&, ProgressBar&)) {
   CLI::App* sub = program.app.add_subcommand(name, help);
   sub->add_flag("--json", program.json, "Print one JSON object");

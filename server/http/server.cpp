@@ -12,6 +12,7 @@
 #include <deque>
 #include <set>
 #include <thread>
+#include <tuple>
 
 #include "server/http/api.h"
 #include "server/http/static_files.h"
@@ -159,13 +160,14 @@ Result<void> Server::listen() {
   const auto address = asio::ip::make_address(options_.address, error);
   if (error) return fail(ErrorCode::InvalidArgument, "--address: '" + options_.address + "' is not an IP address");
   const tcp::endpoint endpoint(address, options_.port);
-  acceptor_.open(endpoint.protocol(), error);
-  if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
-  if (!error) acceptor_.bind(endpoint, error);
-  if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-  if (error) {
+  try {
+    acceptor_.open(endpoint.protocol());
+    acceptor_.set_option(tcp::acceptor::reuse_address(true));
+    acceptor_.bind(endpoint);
+    acceptor_.listen(asio::socket_base::max_listen_connections);
+  } catch (const boost::system::system_error& refused) {
     return fail(ErrorCode::Io, "cannot listen on " + options_.address + " port " + std::to_string(options_.port) +
-                                   ": " + error.message());
+                                   ": " + refused.code().message());
   }
   return {};
 }
@@ -182,7 +184,7 @@ awaitable<void> Server::acceptLoop() {
       continue;
     }
     if (connections_ >= kMostConnections) continue;  // closes it
-    socket.set_option(tcp::no_delay(true), error);
+    std::ignore = socket.set_option(tcp::no_delay(true), error);
     const auto strand = socket.get_executor();
     asio::co_spawn(strand, connection(beast::tcp_stream(std::move(socket))), asio::detached);
   }
@@ -192,10 +194,11 @@ awaitable<void> Server::connection(beast::tcp_stream stream) {
   ++connections_;
   try {
     co_await connectionLoop(stream);
-  } catch (const std::exception&) {  // out of memory in one connection ends that one
+  } catch (const std::exception&) {
+    stream.close();  // out of memory in one connection ends that one
   }
   error_code ignored;
-  if (stream.socket().is_open()) stream.socket().shutdown(tcp::socket::shutdown_send, ignored);
+  if (stream.socket().is_open()) std::ignore = stream.socket().shutdown(tcp::socket::shutdown_send, ignored);
   --connections_;
 }
 
@@ -262,7 +265,8 @@ awaitable<Response> Server::respond(Request request) {
   }
   const auto here = co_await asio::this_coro::executor;
   plans_ += heavy ? 1 : 0;
-  co_await asio::post(heavy ? plan_thread_.get_executor() : api_threads_.get_executor(), asio::use_awaitable);
+  asio::thread_pool& pool = heavy ? plan_thread_ : api_threads_;
+  co_await asio::post(pool.get_executor(), asio::use_awaitable);
   Response response;
   try {
     if (Api::owns(request.path)) {
@@ -360,17 +364,19 @@ awaitable<void> Server::drill(beast::tcp_stream& stream, const BeastRequest& req
   co_await socket.async_accept(request, noThrow(error));
   if (error) co_return;
   const auto link = std::make_shared<Link>(socket);
-  const auto worker = startWorker(ticket, link);
-  if (!worker) link->send(ws::refusal(worker.error().message, ws::kPolicy));
+  const auto started = startWorker(ticket, link);
+  if (!started) link->send(ws::refusal(started.error().message, ws::kPolicy));
+  // Named, not chosen inside the co_await below: g++ 12 destroys such a temporary twice.
+  const std::shared_ptr<ws::DrillWorker> worker = started ? *started : nullptr;
   {
     const std::scoped_lock lock(links_mutex_);
     links_.insert(link);
   }
   asio::co_spawn(link->socket.get_executor(), writeAnswers(link), asio::detached);
-  co_await readPoses(link, worker ? *worker : nullptr);
+  co_await readPoses(link, worker);
   link->ended = true;
   link->wake.cancel();
-  if (worker) (*worker)->hangUp();
+  if (worker) worker->hangUp();
   const std::scoped_lock lock(links_mutex_);
   links_.erase(link);
 }
@@ -425,7 +431,7 @@ awaitable<void> Server::waitForSignal() {
   co_await signals_.async_wait(asio::use_awaitable);
   ending_ = true;
   error_code ignored;
-  acceptor_.close(ignored);
+  std::ignore = acceptor_.close(ignored);
   {
     const std::scoped_lock lock(links_mutex_);
     for (const auto& link : links_) {
