@@ -123,11 +123,10 @@ Result<DrillSite> siteOfPath(store::Store& store, const std::string& case_id, co
   if (!path) return tl::unexpected(path.error());
   auto volume = loadPointVolume(store, *path);
   if (!volume) return tl::unexpected(volume.error());
-  auto model = loadModel(store, *row);
+  const auto model = loadModel(store, *row);
   if (!model) return tl::unexpected(model.error());
   DrillSite site{std::move(*volume), {path->path.bit, "bounded"}, metrics::planOf(path->path), {}, case_id, path_id};
-  const double lipschitz = lipschitzOf(*model);
-  site.field = rbf::asField(std::move(*model), lipschitz);
+  site.field = rbf::asField(*model, lipschitzOf(*model));
   return site;
 }
 
