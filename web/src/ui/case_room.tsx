@@ -1,5 +1,5 @@
 // Case: the vertebra in 3-D with its three slices, the planned paths, and the way to Drill and Replay.
-import { type Signal, useSignal, useSignalEffect } from "@preact/signals";
+import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import type { Vec3 } from "../contract/bodies";
 import type { CaseDetail, PathInfo, RecordingInfo } from "../contract/rest";
@@ -11,6 +11,7 @@ import { type CaseData, loadCase, pathOf } from "../state/case_data";
 import { useLoaded } from "../state/load";
 import { addressOf, goTo } from "../state/route";
 import { caseCrumbs, counted, Failure, TopBar, Waiting, whenText } from "./parts";
+import { Toggle } from "./scene_tools";
 import { SceneView } from "./scene_view";
 import { type SliceLine, type SliceMark, SliceView } from "./slice_view";
 
@@ -151,20 +152,6 @@ function Views({ data, path }: { data: CaseData; path: PathInfo | null }) {
 /** Where the bit stands before a drill: its tip a little before the entry. */
 function standing(path: PathInfo): { tip: Vec3; axis: Vec3 } {
   return { tip: toPatient(path.frame, [0, 0, -6]), axis: path.frame.axes[2] };
-}
-
-export function Toggle({ text, on }: { text: string; on: Signal<boolean> }) {
-  return (
-    <button
-      type="button"
-      aria-pressed={on.value}
-      onClick={() => {
-        on.value = !on.value;
-      }}
-    >
-      {text}
-    </button>
-  );
 }
 
 function Paths({ detail, chosen }: { detail: CaseDetail; chosen: PathInfo | null }) {

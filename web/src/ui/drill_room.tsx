@@ -13,12 +13,13 @@ import { useLoaded } from "../state/load";
 import { keepLocally, parseMetrics } from "../state/local_recordings";
 import { addressOf, kLocalRecording } from "../state/route";
 import { type Hand, type HandEvent, handAfter, kRestingHand, steeringOf } from "../state/steering";
-import { sliceMarks, Toggle } from "./case_room";
+import { sliceMarks } from "./case_room";
 import { Chart } from "./chart";
 import { DrillControls } from "./drill_controls";
 import { attachHand } from "./drill_input";
 import { MetricsTable } from "./metrics";
 import { caseCrumbs, Failure, Reading, TopBar, Waiting } from "./parts";
+import { BitLooks, Toggle } from "./scene_tools";
 import { SceneView } from "./scene_view";
 import { ServerBadge } from "./server_badge";
 import { SliceView } from "./slice_view";
@@ -156,18 +157,7 @@ function DrillPicture({ opened, session, hand, tell }: PictureProps) {
     <div class="drill-picture">
       <SceneView data={data} label="The bit in the vertebra" onReady={ready}>
         <div class="scene-tools">
-          <button type="button" onClick={() => scene.current?.lookAtEntry()}>
-            Entry
-          </button>
-          <button
-            type="button"
-            onClick={() => {
-              ghost.value = true;
-              scene.current?.lookAlongBit();
-            }}
-          >
-            Along the bit
-          </button>
+          <BitLooks scene={scene} ghost={ghost} />
           <button
             type="button"
             aria-pressed={cut_away.value}

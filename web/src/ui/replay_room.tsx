@@ -10,10 +10,10 @@ import { useLoaded } from "../state/load";
 import { keptLocally } from "../state/local_recordings";
 import { ReplaySession } from "../state/replay_session";
 import { addressOf, kLocalRecording } from "../state/route";
-import { Toggle } from "./case_room";
 import { Chart } from "./chart";
 import { MetricsTable } from "./metrics";
 import { caseCrumbs, Failure, Reading, TopBar, Waiting } from "./parts";
+import { BitLooks, Toggle } from "./scene_tools";
 import { SceneView } from "./scene_view";
 
 interface Opened {
@@ -162,18 +162,7 @@ function ReplayPicture({ opened, session }: { opened: Opened; session: ReplaySes
   return (
     <SceneView data={data} label="The recorded drill" onReady={ready}>
       <div class="scene-tools">
-        <button type="button" onClick={() => scene.current?.lookAtEntry()}>
-          Entry
-        </button>
-        <button
-          type="button"
-          onClick={() => {
-            ghost.value = true;
-            scene.current?.lookAlongBit();
-          }}
-        >
-          Along the bit
-        </button>
+        <BitLooks scene={scene} ghost={ghost} />
         <button type="button" onClick={() => scene.current?.lookAcrossPath()}>
           Across
         </button>
