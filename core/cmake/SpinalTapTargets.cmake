@@ -16,7 +16,7 @@ if(EMSCRIPTEN)
   # Debian's header-only libraries, through a folder of links: -I/usr/include would shadow the sysroot.
   set(links ${CMAKE_BINARY_DIR}/header_only)
   file(MAKE_DIRECTORY ${links})
-  foreach(library tl eigen3)
+  foreach(library tl eigen3 hwy)
     file(CREATE_LINK /usr/include/${library} ${links}/${library} SYMBOLIC)
   endforeach()
   target_include_directories(spinaltap_flags SYSTEM INTERFACE ${links} ${links}/eigen3)
