@@ -128,6 +128,7 @@ void expectOneVertebra(const Reconstructed& made) {
   EXPECT_EQ(c.open_edges, 0U);
   EXPECT_EQ(c.repeated_edges, 0U);
   EXPECT_EQ(c.pinched_vertices, 0U);
+  EXPECT_GE(c.least_angle_deg, mesh::kLeastAngle_deg);
   EXPECT_EQ(c.parts, 1U);
   EXPECT_EQ(c.euler, 0) << "a body with one tunnel, the canal";
 }

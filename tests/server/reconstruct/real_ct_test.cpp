@@ -84,6 +84,7 @@ void expectClosedBone(const Made& made) {
   EXPECT_EQ(c.open_edges, 0U);
   EXPECT_EQ(c.repeated_edges, 0U);
   EXPECT_EQ(c.pinched_vertices, 0U);
+  EXPECT_GE(c.least_angle_deg, mesh::kLeastAngle_deg);
   // Labels are drawn a little outside the half-way edge, by up to half a voxel all round.
   EXPECT_GT(c.volume_mm3, 0.75 * made.label_mm3);
   EXPECT_LT(c.volume_mm3, 1.1 * made.label_mm3);
