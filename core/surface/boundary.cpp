@@ -1,13 +1,15 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "core/surface/ct_edge.h"
+#include "core/base/parallel.h"
+#include "core/surface/candidates.h"
+#include "core/surface/local_shape.h"
 #include "core/surface/neighbours.h"
-#include "core/surface/smooth_label.h"
+#include "core/surface/scanner.h"
+#include "core/surface/shell_edge.h"
 #include "core/surface/surface.h"
 #include "core/volume/crop.h"
 
@@ -17,6 +19,9 @@ namespace {
 // What the profiles need around the label: reach, plateau and disc, in mm, on stacks of up to 1 mm or so; coarser ones
 // get two more voxels below.
 constexpr double kRoom_mm = 5.0;
+constexpr std::size_t kBlock = 64;  // points a thread takes at once
+// A quadric that turns a normal by more than 60 degrees has been misled, by a thin tip or by too few points.
+constexpr double kTrustedTurn = 0.5;
 
 Result<void> checkInput(const volume::CtVolume& ct, const volume::LabelVolume& label, const BoundaryOptions& o) {
   if (auto ok = volume::checkGrid(ct.grid); !ok) return ok;
@@ -50,108 +55,125 @@ Result<Part> cropToLabel(const volume::CtVolume& ct, const volume::LabelVolume& 
   return Part{std::move(*ct_part), std::move(*label_part)};
 }
 
-/// A boundary point in the making, in the grid's own axes.
-struct Candidate {
-  Vec3 place_mm;
-  Vec3 normal;  ///< unit, outward
+struct Outline {
+  SmoothLabel label;
+  std::vector<Candidate> points;
 };
 
-/// Slides a place near the boundary onto the smoothed label's half-way level.
-std::optional<Candidate> settle(const SmoothLabel& label, Vec3 place, double longest_step) {
-  Vec3 gradient;
-  for (int round = 0; round < 3; ++round) {
-    gradient = label.gradient(place);
-    const double square = dot(gradient, gradient);
-    if (!(square > 1e-6)) return std::nullopt;
-    Vec3 step = gradient * ((0.5 - label.value(place)) / square);
-    if (const double length = norm(step); length > longest_step) step *= longest_step / length;
-    place += step;
+Result<Outline> findOutline(const volume::LabelVolume& label, double spacing_mm) {
+  const auto with = [&](double blur_voxels) {
+    SmoothLabel smooth(label, blur_voxels);
+    auto points = candidatesOn(smooth, spacing_mm);
+    return Outline{std::move(smooth), std::move(points)};
+  };
+  Outline found = with(SmoothLabel::kBlur_voxels);
+  if (found.points.size() < 4) found = with(SmoothLabel::kFaintBlur_voxels);
+  if (found.points.size() < 4) {
+    return fail(ErrorCode::Degenerate,
+                "the label has no boundary to speak of: " + std::to_string(found.points.size()) + " points");
   }
-  if (std::abs(label.value(place) - 0.5) > 0.1) return std::nullopt;
-  return Candidate{place, -normalized(gradient)};
+  return found;
 }
 
-/// Where the edges of a lattice cross the level: an even supply, whatever the voxels' shape.
-std::vector<Candidate> candidatesOf(const SmoothLabel& label, double step) {
-  const Vec3 low = label.low(), size = label.high() - low;
-  const int nx = static_cast<int>(size.x / step) + 2, ny = static_cast<int>(size.y / step) + 2,
-            nz = static_cast<int>(size.z / step) + 2;
-  const auto place = [&](int i, int j, int k) { return low + Vec3{i * step, j * step, k * step}; };
-  const auto index = [&](int i, int j) {
-    return static_cast<std::size_t>(j) * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i);
-  };
-  std::vector<double> layer(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny)), below;
-  std::vector<Candidate> out;
-  const auto cross_edge = [&](const Vec3& a, const Vec3& b, double at_a, double at_b) {
-    if ((at_a > 0.5) == (at_b > 0.5)) return;
-    const Vec3 start = a + (b - a) * ((0.5 - at_a) / (at_b - at_a));
-    if (const auto settled = settle(label, start, step)) out.push_back(*settled);
-  };
-  for (int k = 0; k < nz; ++k) {
-    for (int j = 0; j < ny; ++j)
-      for (int i = 0; i < nx; ++i) layer[index(i, j)] = label.value(place(i, j, k));
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
-        const double here = layer[index(i, j)];
-        if (i > 0) cross_edge(place(i - 1, j, k), place(i, j, k), layer[index(i - 1, j)], here);
-        if (j > 0) cross_edge(place(i, j - 1, k), place(i, j, k), layer[index(i, j - 1)], here);
-        if (k > 0) cross_edge(place(i, j, k - 1), place(i, j, k), below[index(i, j)], here);
-      }
+std::vector<Vec3> placesOf(const std::vector<Candidate>& points) {
+  std::vector<Vec3> out;
+  out.reserve(points.size());
+  for (const Candidate& c : points) out.push_back(c.place_mm);
+  return out;
+}
+
+/// Normals of the quadrics through the points as they lie now.
+void takeLocalNormals(std::vector<Candidate>& points, double radius) {
+  const std::vector<Vec3> places = placesOf(points);
+  std::vector<Vec3> normals;
+  normals.reserve(points.size());
+  for (const Candidate& c : points) normals.push_back(c.normal);
+  const Neighbours near(places, radius);
+  parallelBlocks(points.size(), kBlock, 0, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (points[i].cut) continue;
+      const Vec3 normal = shapeAround({places, normals, &near}, i, radius).normal;
+      if (dot(normal, normals[i]) > kTrustedTurn) points[i].normal = normal;
     }
-    below = layer;
+  });
+}
+
+// An edge that differs from its neighbours by more is another one.
+constexpr double kFalse_mm = 0.25, kFalse_voxels = 0.25;
+
+using Offsets = std::vector<std::optional<double>>;
+
+Offsets offsetsOf(const volume::CtVolume& ct, const Outline& outline, const Scanner& scanner,
+                  const BoundaryOptions& options) {
+  const std::vector<Candidate>& points = outline.points;
+  Offsets out(points.size());
+  parallelBlocks(points.size(), kBlock, 0, [&](std::size_t begin, std::size_t end) {
+    std::vector<double> hu;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (points[i].cut) continue;
+      const EdgeQuery query = queryAt(outline.label, ct.grid, scanner, points[i], options);
+      if (const auto edge = findShellEdge(sampleProfile(ct, points[i], query, hu), query)) out[i] = edge->edge_mm;
+    }
+  });
+  return out;
+}
+
+struct Move {
+  double offset_mm = 0;
+  Placed by = Placed::ByLabel;
+};
+
+/// The CT's edge, unless it stands out from its neighbours' median by more than `tolerance`: then, and where there is
+/// none, the median itself.
+std::vector<Move> settledMoves(const std::vector<Candidate>& points, const Offsets& offsets, double radius,
+                               double tolerance) {
+  constexpr std::size_t kFewest = 3;
+  const std::vector<Vec3> places = placesOf(points);
+  const Neighbours near(places, radius);
+  std::vector<Move> out(points.size());
+  parallelBlocks(points.size(), kBlock, 0, [&](std::size_t begin, std::size_t end) {
+    std::vector<double> around;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (points[i].cut) {
+        out[i].by = Placed::ByVolume;
+        continue;
+      }
+      around.clear();
+      near.eachWithin(places[i], radius, [&](std::size_t n) {
+        if (offsets[n] && dot(points[n].normal, points[i].normal) > 0.5) around.push_back(*offsets[n]);
+      });
+      if (around.size() < kFewest) continue;
+      const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
+      std::nth_element(around.begin(), middle, around.end());
+      const bool own = offsets[i] && std::abs(*offsets[i] - *middle) <= tolerance;
+      out[i] = own ? Move{*offsets[i], Placed::ByCt} : Move{*middle, Placed::ByNeighbours};
+    }
+  });
+  return out;
+}
+
+OrientedPoints inPatient(const volume::Grid& grid, const std::vector<Candidate>& points, const std::vector<Move>& moves,
+                         const Scanner& scanner) {
+  OrientedPoints out;
+  out.scanner = scanner;
+  const Vec3& s = grid.spacing_mm;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3& place = points[i].place_mm;
+    out.positions_patient.push_back(grid.toPatient({place.x / s.x, place.y / s.y, place.z / s.z}));
+    out.normals.push_back(grid.direction * points[i].normal);
+    out.placed.push_back(moves[i].by);
+    out.from_ct += moves[i].by == Placed::ByCt ? 1 : 0;
   }
   return out;
 }
 
-/// Keeps candidates that are at least `spacing` from every one kept before.
-std::vector<Candidate> thinned(const std::vector<Candidate>& all, double spacing) {
-  std::vector<Vec3> places;
-  for (const Candidate& c : all) places.push_back(c.place_mm);
-  const Neighbours near(places, spacing);
-  std::vector<std::uint8_t> blocked(all.size(), 0);
-  std::vector<Candidate> out;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (blocked[i] != 0) continue;
-    out.push_back(all[i]);
-    near.eachWithin(places[i], spacing, [&](std::size_t n) { blocked[n] = 1; });
-  }
-  return out;
-}
-
-/// Every normal becomes the mean of those around it: voxel steps wobble them.
-void smoothNormals(std::vector<Candidate>& points, double radius) {
-  std::vector<Vec3> places, normals(points.size());
-  for (const Candidate& c : points) places.push_back(c.place_mm);
-  const Neighbours near(places, radius);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    near.eachWithin(places[i], radius, [&](std::size_t n) {
-      if (dot(points[n].normal, points[i].normal) > 0) normals[i] += points[n].normal;
-    });
-  }
-  for (std::size_t i = 0; i < points.size(); ++i) points[i].normal = normalized(normals[i]);
-}
-
-/// Offsets that stand out from their neighbours' median by more than half a voxel are false edges.
-std::size_t dropFalseEdges(const std::vector<Candidate>& points, double radius, double tolerance,
-                           std::vector<std::optional<double>>& offsets) {
-  std::vector<Vec3> places;
-  for (const Candidate& c : points) places.push_back(c.place_mm);
-  const Neighbours near(places, radius);
-  const std::vector<std::optional<double>> before = offsets;
-  std::size_t kept = 0;
-  std::vector<double> around;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!before[i]) continue;
-    around.clear();
-    near.eachWithin(places[i], radius, [&](std::size_t n) {
-      if (before[n] && dot(points[n].normal, points[i].normal) > 0.5) around.push_back(*before[n]);
-    });
-    const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
-    std::nth_element(around.begin(), middle, around.end());
-    if (std::abs(*before[i] - *middle) > tolerance) offsets[i] = *middle;
-    ++kept;
-  }
-  return kept;
+/// A move along a normal must not leave the volume, whose faces are the surface where bone reaches them.
+Vec3 keptWithin(const volume::Grid& grid, const Vec3& place) {
+  const Vec3& s = grid.spacing_mm;
+  const auto kept = [](double at, double spacing, int count) {
+    return std::clamp(at, -0.5 * spacing, (count - 0.5) * spacing);
+  };
+  return {kept(place.x, s.x, grid.dims[0]), kept(place.y, s.y, grid.dims[1]), kept(place.z, s.z, grid.dims[2])};
 }
 
 }  // namespace
@@ -164,26 +186,27 @@ Result<OrientedPoints> findBoundary(const volume::CtVolume& ct, const volume::La
   if (auto ok = checkInput(ct, label, options); !ok) return tl::unexpected(ok.error());
   const auto part = cropToLabel(ct, label);
   if (!part) return tl::unexpected(part.error());
-  const SmoothLabel smooth(part->label);
-  report(0.3);
-  std::vector<Candidate> points = thinned(candidatesOf(smooth, 0.7 * options.spacing_mm), options.spacing_mm);
-  if (points.size() < 4) return fail(ErrorCode::Degenerate, "the label has no boundary to speak of");
-  smoothNormals(points, 1.5 * options.spacing_mm);
-  report(0.5);
-
-  std::vector<std::optional<double>> offsets;
-  for (const Candidate& c : points) offsets.push_back(findCtEdge(part->ct, c.place_mm, c.normal, options));
-  report(0.9);
+  report(0.05);
+  auto outline = findOutline(part->label, options.spacing_mm);
+  if (!outline) return tl::unexpected(outline.error());
+  std::vector<Candidate>& points = outline->points;
   const Vec3& s = ct.grid.spacing_mm;
-  OrientedPoints out;
-  out.from_ct = dropFalseEdges(points, 3 * options.spacing_mm, 0.5 * std::max({s.x, s.y, s.z}), offsets);
+  const double longest = std::max({s.x, s.y, s.z});
+  const double radius = std::max({kNormalRadius_mm, 2.5 * options.spacing_mm, 1.25 * longest});
+  takeLocalNormals(points, std::max(radius, longest));
+  report(0.4);
+  const Scanner scanner = estimateScanner(part->ct, outline->label, points, options);
+  report(0.6);
+  const Offsets offsets = offsetsOf(part->ct, *outline, scanner, options);
+  report(0.9);
+  std::vector<Move> moves =
+      settledMoves(points, offsets, 3 * options.spacing_mm, std::max(kFalse_mm, kFalse_voxels * longest));
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 place = points[i].place_mm + points[i].normal * offsets[i].value_or(0.0);
-    out.positions_patient.push_back(part->ct.grid.toPatient({place.x / s.x, place.y / s.y, place.z / s.z}));
-    out.normals.push_back(ct.grid.direction * points[i].normal);
+    points[i].place_mm = keptWithin(part->ct.grid, points[i].place_mm + points[i].normal * moves[i].offset_mm);
   }
+  takeLocalNormals(points, radius);
   report(1.0);
-  return out;
+  return inPatient(part->ct.grid, points, moves, scanner);
 }
 
 }  // namespace spinaltap::surface

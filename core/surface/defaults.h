@@ -11,6 +11,8 @@ namespace spinaltap::surface {
 /// Distance between boundary points. A lumbar vertebra has some 15,000 mm^2: 1 mm gives about 10,000 points, dense
 /// enough for the roundings of the processes (radius 3 mm and more).
 inline constexpr double kSampleSpacing_mm = 1.0;
+/// Normals are those of quadrics through the points within so much.
+inline constexpr double kNormalRadius_mm = 2.0;
 /// Off-surface samples lie this far along the normals. Larger than the position noise, smaller than half a lamina.
 inline constexpr double kOffset_mm = 1.0;
 /// The fit stops when every sample is met this closely: below the half voxel (0.25 mm) that the mesh must reach.

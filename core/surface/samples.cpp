@@ -1,13 +1,18 @@
+#include <algorithm>
 #include <cmath>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "core/base/parallel.h"
 #include "core/surface/neighbours.h"
 #include "core/surface/surface.h"
 
 namespace spinaltap::surface {
 namespace {
 
-constexpr int kHalvings = 4;  // 1, 1/2, 1/4, 1/8 of the offset; less than a tenth is dropped
+constexpr double kOfTheBall = 0.8;   // of the largest ball: a clear margin to the next point, and to the medial axis
+constexpr double kLeastShare = 0.1;  // of the offset: a sample closer than that to its own point says nothing
 
 Result<void> checkPoints(const OrientedPoints& points, double offset_mm) {
   if (points.positions_patient.size() != points.normals.size()) {
@@ -25,6 +30,20 @@ Result<void> checkPoints(const OrientedPoints& points, double offset_mm) {
   return {};
 }
 
+/// The radius of the largest ball, up to `most`, that touches the surface at a point from the side of the unit vector
+/// `way` and holds no other point: a ball of radius r around p + r way holds q when |q - p|^2 < 2 r way . (q - p).
+double emptyBall(const Neighbours& near, std::span<const Vec3> places, std::size_t which, const Vec3& way,
+                 double most) {
+  const Vec3& place = places[which];
+  double radius = most;
+  near.eachWithin(place + way * most, most, [&](std::size_t n) {
+    const Vec3 d = places[n] - place;
+    const double along = dot(d, way), square = dot(d, d);
+    if (n != which && along > 0 && square > 0) radius = std::min(radius, square / (2 * along));
+  });
+  return radius;
+}
+
 }  // namespace
 
 Result<SignedSamples> makeSamples(const OrientedPoints& points, double offset_mm) {
@@ -32,23 +51,24 @@ Result<SignedSamples> makeSamples(const OrientedPoints& points, double offset_mm
   SignedSamples out;
   out.positions = points.positions_patient;
   out.distances_mm.assign(out.positions.size(), 0.0);
-  const Neighbours near(points.positions_patient, offset_mm);
-  const auto is_own = [&](const Vec3& place, double distance, std::size_t self) {
-    bool own = true;
-    // A hair less than its own distance: points at one place may not shut each other out.
-    near.eachWithin(place, distance * (1 - 1e-6), [&](std::size_t n) { own = own && n == self; });
-    return own;
-  };
-  for (std::size_t i = 0; i < points.normals.size(); ++i) {
-    for (const double side : {1.0, -1.0}) {
-      double distance = offset_mm;
-      for (int round = 0; round < kHalvings; ++round, distance /= 2) {
-        const Vec3 place = points.positions_patient[i] + points.normals[i] * (side * distance);
-        if (!is_own(place, distance, i)) continue;
-        out.positions.push_back(place);
-        out.distances_mm.push_back(side * distance);
-        break;
-      }
+  const std::span<const Vec3> places(points.positions_patient);
+  const Neighbours near(places, offset_mm);
+  std::vector<double> before(places.size()), behind(places.size());
+  parallelBlocks(places.size(), 64, 0, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto room = [&](const Vec3& way) {
+        if (dot(way, way) < 0.5) return 0.0;  // a point without a normal
+        return std::min(offset_mm, kOfTheBall * emptyBall(near, places, i, way, offset_mm / kOfTheBall));
+      };
+      before[i] = room(points.normals[i]);
+      behind[i] = room(-points.normals[i]);
+    }
+  });
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (const double distance : {before[i], -behind[i]}) {
+      if (std::abs(distance) < kLeastShare * offset_mm) continue;
+      out.positions.push_back(places[i] + points.normals[i] * distance);
+      out.distances_mm.push_back(distance);
     }
   }
   return out;

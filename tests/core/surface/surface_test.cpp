@@ -9,80 +9,10 @@
 #include "core/base/dmath.h"
 #include "core/base/random.h"
 #include "core/surface/neighbours.h"
+#include "tests/core/surface/ball.h"
 
 namespace spinaltap::surface {
 namespace {
-
-using volume::CtVolume;
-using volume::Grid;
-using volume::LabelVolume;
-
-struct Scan {
-  CtVolume ct;
-  LabelVolume label;
-};
-
-/// A ball with a dense shell. HU are blurred across the edge over 1 mm, as a scanner's; the label is its voxels.
-struct Ball {
-  Vec3 middle;
-  double radius = 12;
-  double inside_hu = 800, outside_hu = 40;
-
-  [[nodiscard]] double hu(const Vec3& p) const {
-    const double d = norm(p - middle) - radius;
-    return outside_hu + (inside_hu - outside_hu) * std::clamp(0.5 - d, 0.0, 1.0);
-  }
-};
-
-Scan scan(const Grid& grid, const Ball& ball) {
-  Scan out{{grid, {}}, {grid, {}}};
-  for (int k = 0; k < grid.dims[2]; ++k) {
-    for (int j = 0; j < grid.dims[1]; ++j) {
-      for (int i = 0; i < grid.dims[0]; ++i) {
-        const Vec3 p = grid.toPatient({1.0 * i, 1.0 * j, 1.0 * k});
-        out.ct.hu.push_back(static_cast<std::int16_t>(std::lround(ball.hu(p))));
-        out.label.inside.push_back(norm(p - ball.middle) <= ball.radius ? 1 : 0);
-      }
-    }
-  }
-  return out;
-}
-
-Grid gridAround(const Vec3& middle, const Vec3& spacing, double half_mm, const Mat3& direction = {}) {
-  Grid g;
-  g.spacing_mm = spacing;
-  g.direction = direction;
-  g.dims = {static_cast<int>(2 * half_mm / spacing.x) + 1, static_cast<int>(2 * half_mm / spacing.y) + 1,
-            static_cast<int>(2 * half_mm / spacing.z) + 1};
-  g.origin_patient = middle - direction * Vec3{half_mm, half_mm, half_mm};
-  return g;
-}
-
-Mat3 turned() {
-  const SinCos a = sinCos(0.5), b = sinCos(0.3);
-  Mat3 m;
-  m.col_x = {a.cos, a.sin, 0};
-  m.col_y = {-a.sin * b.cos, a.cos * b.cos, b.sin};
-  m.col_z = cross(m.col_x, m.col_y);
-  return m;
-}
-
-struct Errors {
-  double rms = 0, worst = 0, worst_cosine = 1;
-};
-
-Errors errorsOf(const OrientedPoints& points, const Ball& ball) {
-  Errors e;
-  for (std::size_t i = 0; i < points.normals.size(); ++i) {
-    const Vec3 d = points.positions_patient[i] - ball.middle;
-    const double off = norm(d) - ball.radius;
-    e.rms += off * off;
-    e.worst = std::max(e.worst, std::abs(off));
-    e.worst_cosine = std::min(e.worst_cosine, dot(points.normals[i], normalized(d)));
-  }
-  e.rms = std::sqrt(e.rms / static_cast<double>(points.normals.size()));
-  return e;
-}
 
 TEST(FindBoundary, MeetsTheEdgeOfTheCtFarBetterThanAVoxel) {
   const Ball ball;
@@ -161,16 +91,6 @@ TEST(FindBoundary, PointsAreSpacedAndCoverTheSurface) {
   }
 }
 
-TEST(FindBoundary, ALabelCutByTheVolumesEdgeIsClosedThere) {
-  const Ball ball;
-  Scan s = scan(gridAround({0, 0, 10}, {0.5, 0.5, 0.5}, 15), ball);  // the lower part is missing
-  const auto points = findBoundary(s.ct, s.label);
-  ASSERT_TRUE(points.has_value());
-  const auto lowest = std::min_element(points->positions_patient.begin(), points->positions_patient.end(),
-                                       [](const Vec3& a, const Vec3& b) { return a.z < b.z; });
-  EXPECT_NEAR(lowest->z, -5, 0.8);  // the face of the first slice, to about a voxel
-}
-
 TEST(FindBoundary, RefusesWhatDoesNotFit) {
   const Scan s = scan(gridAround({0, 0, 0}, {1, 1, 1}, 15), Ball{});
   LabelVolume empty = s.label;
@@ -208,7 +128,7 @@ TEST(MakeSamples, OffSurfaceSamplesHaveTheirOwnPointAsTheNearest) {
     }
     (distance == 1.0 ? whole : shortened) += 1;
     if (samples->distances_mm[s] > 0) {
-      EXPECT_EQ(distance, 0.5);  // between the sheets: 1 is beyond the other one's half, 0.5 is not
+      EXPECT_NEAR(distance, 0.48, 1e-12);  // between the sheets: 0.8 of the ball of 0.6 that fits
     }
   }
   EXPECT_EQ(shortened, 800U);
@@ -222,6 +142,43 @@ TEST(MakeSamples, DropsASampleThatWouldNeedATinyOffset) {
   const auto samples = makeSamples(points, 1.0);
   ASSERT_TRUE(samples.has_value());
   EXPECT_EQ(samples->positions.size(), 3U + 2U + 2U);  // between the close pair there is no room on either side
+}
+
+/// The slow twin: every other point asked.
+TEST(MakeSamples, AreAsFarAsTheLargestEmptyBallLets) {
+  Random random(35);
+  OrientedPoints points;
+  for (int i = 0; i < 300; ++i) {
+    points.positions_patient.push_back({random.uniform(0, 6), random.uniform(0, 6), random.uniform(0, 6)});
+    points.normals.push_back(normalized({random.gaussian(), random.gaussian(), random.gaussian()}));
+  }
+  const auto samples = makeSamples(points, 1.0);
+  ASSERT_TRUE(samples.has_value());
+  std::size_t next = points.normals.size();
+  for (std::size_t i = 0; i < points.normals.size(); ++i) {
+    for (const double side : {1.0, -1.0}) {
+      double ball = 1.25;
+      for (std::size_t n = 0; n < points.normals.size(); ++n) {
+        const Vec3 d = points.positions_patient[n] - points.positions_patient[i];
+        const double along = side * dot(d, points.normals[i]);
+        if (n != i && along > 0) ball = std::min(ball, dot(d, d) / (2 * along));
+      }
+      if (0.8 * ball < 0.1) continue;
+      ASSERT_LT(next, samples->positions.size()) << "seed 35, point " << i;
+      EXPECT_NEAR(samples->distances_mm[next], side * 0.8 * ball, 1e-12) << "seed 35, point " << i;
+      ++next;
+    }
+  }
+  EXPECT_EQ(next, samples->positions.size());
+}
+
+TEST(MakeSamples, APointWithoutANormalIsOnTheSurfaceAndNothingElse) {
+  OrientedPoints points;
+  points.positions_patient = {{0, 0, 0}, {5, 0, 0}};
+  points.normals = {{0, 0, 0}, {0, 0, 1}};
+  const auto samples = makeSamples(points, 1.0);
+  ASSERT_TRUE(samples.has_value());
+  EXPECT_EQ(samples->positions.size(), 2U + 2U);
 }
 
 TEST(MakeSamples, RefusesNothingAndNonsense) {
