@@ -40,6 +40,11 @@ struct ReconstructOptions {
   std::size_t max_centres = surface::kMaxCentres;
 };
 
+struct ExportOptions {
+  std::string data, case_id, format, out;
+  std::optional<double> simplify_mm;
+};
+
 struct PlanOptions {
   std::string data, case_id, label, entry, target;
   plan::Bit bit;

@@ -108,6 +108,19 @@ void addReconstruct(Program& program) {
   sub->add_option("--data", o->data, kDataHelp);
 }
 
+void addExport(Program& program) {
+  auto o = std::make_shared<ExportOptions>();
+  CLI::App* sub = add(program, "export", "Write the surface as STL or PLY, mm, patient LPS", o, runExport);
+  sub->add_option("CASE", o->case_id, "Case id")->required();
+  sub->add_option("--format", o->format, "stl (binary) or ply (binary, with normals)")
+      ->required()
+      ->check(CLI::IsMember({"stl", "ply"}));
+  sub->add_option("--out", o->out, "File to write: whole or not at all")->required();
+  sub->add_option("--simplify", o->simplify_mm, "Fewer triangles, nowhere farther than this from the surface, mm")
+      ->check(CLI::Range(1e-3, 10.0));
+  sub->add_option("--data", o->data, kDataHelp);
+}
+
 void addPlan(Program& program) {
   auto o = std::make_shared<PlanOptions>();
   CLI::App* sub = add(program, "plan", "Plan a path and make its points; prints its id", o, runPlan);
@@ -217,6 +230,7 @@ int run(int argc, char** argv) {
   addImport(program);
   addSegment(program);
   addReconstruct(program);
+  addExport(program);
   addPlan(program);
   addDrill(program);
   addRest(program);

@@ -5,6 +5,7 @@
 
 #include "core/session/session.h"
 #include "server/http/entity.h"
+#include "server/jobs/export_job.h"
 #include "server/jobs/plan_job.h"
 #include "server/store/rows.h"
 
@@ -109,6 +110,8 @@ const std::vector<Api::Route>& Api::routes() {
       {"GET", "/api/v1/cases", &Api::listCases},
       {"GET", "/api/v1/cases/{}", &Api::showCase},
       {"GET", "/api/v1/cases/{}/mesh", &Api::sendMesh},
+      {"GET", "/api/v1/cases/{}/mesh.stl", &Api::sendStl},
+      {"GET", "/api/v1/cases/{}/mesh.ply", &Api::sendPly},
       {"GET", "/api/v1/cases/{}/volume", &Api::sendVolume},
       {"POST", "/api/v1/cases/{}/paths", &Api::addPath},
       {"GET", "/api/v1/cases/{}/paths/{}/point-volume", &Api::sendPointVolume},
@@ -182,6 +185,30 @@ Response Api::sendBlob(const Request& request, const store::BlobId& id, const st
 Response Api::sendMesh(const Request& request, const Parts& ids) {
   const auto row = store_.findCase(ids[0]);
   return row ? sendBlob(request, row->mesh, "case " + row->id + " is not reconstructed yet") : problemOf(row.error());
+}
+
+/// Made anew each time, some 50 ms: it is asked for once in a while, and would double what a case takes on disk.
+Response Api::sendMeshFile(const Request& request, const std::string& case_id, mesh_out::Format format) {
+  const auto row = store_.findCase(case_id);
+  if (!row) return problemOf(row.error());
+  auto bytes = jobs::meshFile(store_, *row, format);
+  if (!bytes) return problemOf(bytes.error());
+  Entity entity;
+  entity.tag = store::blobIdOf(*bytes);
+  entity.plain = std::make_shared<const std::vector<std::byte>>(std::move(*bytes));
+  entity.type = mesh_out::mediaTypeOf(format);
+  Response response = answer(request, entity);
+  response.headers.emplace_back("Content-Disposition",
+                                "attachment; filename=\"spinaltap-" + row->id + "." + mesh_out::nameOf(format) + "\"");
+  return response;
+}
+
+Response Api::sendStl(const Request& request, const Parts& ids) {
+  return sendMeshFile(request, ids[0], mesh_out::Format::Stl);
+}
+
+Response Api::sendPly(const Request& request, const Parts& ids) {
+  return sendMeshFile(request, ids[0], mesh_out::Format::Ply);
 }
 
 Response Api::sendVolume(const Request& request, const Parts& ids) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "server/http/message.h"
+#include "server/mesh_out/mesh_file.h"
 #include "server/store/store.h"
 #include "server/ws/waiting_room.h"
 
@@ -32,6 +33,8 @@ class Api {
   Response listCases(const Request&, const Parts&);
   Response showCase(const Request&, const Parts& ids);
   Response sendMesh(const Request&, const Parts& ids);
+  Response sendStl(const Request&, const Parts& ids);
+  Response sendPly(const Request&, const Parts& ids);
   Response sendVolume(const Request&, const Parts& ids);
   Response sendPointVolume(const Request&, const Parts& ids);
   Response addPath(const Request&, const Parts& ids);
@@ -40,6 +43,7 @@ class Api {
   Response sendRecording(const Request&, const Parts& ids);
   Response health(const Request&, const Parts&);
   Response ready(const Request&, const Parts&);
+  Response sendMeshFile(const Request& request, const std::string& case_id, mesh_out::Format format);
   Response sendBlob(const Request& request, const store::BlobId& id, const std::string& missing);
 
   store::Store& store_;

@@ -1,5 +1,6 @@
 #include "server/jobs/case_files.h"
 
+#include "core/wire/mesh_message.h"
 #include "core/wire/point_volume_message.h"
 
 namespace spinaltap::jobs {
@@ -26,6 +27,10 @@ Result<volume::LabelVolume> loadLabel(store::Store& store, const store::Case& ro
 
 Result<volume::CtVolume> loadRoi(store::Store& store, const store::Case& row) {
   return load(store, row.roi, "case " + row.id + " is not reconstructed yet", decodeCt);
+}
+
+Result<mesh::TriangleMesh> loadMesh(store::Store& store, const store::Case& row) {
+  return load(store, row.mesh, "case " + row.id + " is not reconstructed yet", wire::decodeMesh);
 }
 
 Result<rbf::Model> loadModel(store::Store& store, const store::Case& row) {

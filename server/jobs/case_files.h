@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "core/mesh/triangle_mesh.h"
 #include "core/point_volume/point_volume.h"
 #include "server/jobs/codec.h"
 #include "server/store/store.h"
@@ -14,6 +15,7 @@ namespace spinaltap::jobs {
 [[nodiscard]] Result<volume::LabelVolume> loadLabel(store::Store& store, const store::Case& row);
 /// The CT around the vertebra.
 [[nodiscard]] Result<volume::CtVolume> loadRoi(store::Store& store, const store::Case& row);
+[[nodiscard]] Result<mesh::TriangleMesh> loadMesh(store::Store& store, const store::Case& row);
 [[nodiscard]] Result<rbf::Model> loadModel(store::Store& store, const store::Case& row);
 [[nodiscard]] Result<point_volume::PointVolume> loadPointVolume(store::Store& store, const store::Path& row);
 

@@ -95,6 +95,15 @@ TEST_F(Figures, OfEveryCommandAreDocumentedFromPhantomToReplay) {
   EXPECT_GT(made["samples"], made["centres"]);
   EXPECT_LT(made["residual_rms_mm"], made["residual_max_mm"]);
 
+  const Json whole = json({"export", case_, "--format", "stl", "--out", path("bone.stl"), "--data", data}, "export");
+  EXPECT_EQ(whole["triangles"], made["triangles"]);
+  EXPECT_EQ(whole["bytes"], std::filesystem::file_size(path("bone.stl")));
+  const Json fewer = json(
+      {"export", case_, "--format", "ply", "--simplify", "0.2", "--out", path("bone.ply"), "--data", data}, "export");
+  EXPECT_EQ(fewer["triangles_before"], made["triangles"]);
+  EXPECT_LT(fewer["triangles"], made["triangles"].get<int>() / 2);
+  EXPECT_EQ(fewer["bytes"], std::filesystem::file_size(path("bone.ply")));
+
   const Json& pedicle = phantom_["pedicles"]["left"];
   const Json planned = json({"plan", case_, "--entry", joined(pedicle["entry_patient"]), "--target",
                              joined(pedicle["target_patient"]), "--spacing", "0.25", "--label", "left", "--data", data},
@@ -132,6 +141,9 @@ TEST_F(Figures, OfAnUnsegmentedCaseSayWhatComesFirst) {
             "spinaltap: case " + id + " was imported without a label: give a seed\n");
   EXPECT_EQ(run({"reconstruct", id, "--data", path("fresh")}).err,
             "spinaltap: case " + id + " has no label yet: segment it first\n");
+  EXPECT_EQ(run({"export", id, "--format", "stl", "--out", path("none.stl"), "--data", path("fresh")}).err,
+            "spinaltap: case " + id + " is not reconstructed yet\n");
+  EXPECT_FALSE(std::filesystem::exists(path("none.stl")));
   EXPECT_EQ(run({"plan", id, "--entry", "0,0,0", "--target", "0,0,9", "--data", path("fresh")}).err,
             "spinaltap: case " + id + " is not reconstructed yet\n");
 }

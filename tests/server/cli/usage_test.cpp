@@ -10,8 +10,8 @@
 namespace spinaltap::test {
 namespace {
 
-const std::vector<std::string> kCommands{"phantom", "import", "segment", "reconstruct", "plan",
-                                         "drill",   "replay", "serve",   "cases",       "version"};
+const std::vector<std::string> kCommands{"phantom", "import", "segment", "reconstruct", "plan",  "drill",
+                                         "replay",  "serve",  "cases",   "version",     "export"};
 
 void expectOneLine(const Finished& finished, int code) {
   EXPECT_EQ(finished.code, code) << finished.err;
@@ -42,6 +42,9 @@ TEST(Usage, WrongUsageEndsWithTwoAndOneLine) {
            {"import", "--from", "x", "--label-value", "3"},
            {"segment", "c7", "--seed", "1,2"},
            {"segment", "c7", "--threshold", "200"},
+           {"export", "c7"},
+           {"export", "c7", "--format", "obj", "--out", "a.obj"},
+           {"export", "c7", "--format", "stl", "--out", "a.stl", "--simplify", "0"},
            {"plan", "c7", "--entry", "1,2,3"},
            {"plan", "c7", "--entry", "1,2,x", "--target", "1,2,3"},
            {"plan", "c7", "--entry", "1,2,nan", "--target", "1,2,3"},

@@ -82,6 +82,27 @@ TEST_F(Rest, SendsBodiesWithTheirHashAsTag) {
   EXPECT_EQ(get(port(), caseUrl("/volume")).body.substr(0, 4), "STV1");
 }
 
+TEST_F(Rest, SendsTheSurfaceAsFilesToSave) {
+  const Reply stl = get(port(), caseUrl("/mesh.stl")), ply = get(port(), caseUrl("/mesh.ply"));
+  ASSERT_EQ(stl.status, 200);
+  EXPECT_EQ(stl.header("content-type"), "model/stl");
+  EXPECT_EQ(stl.header("content-disposition"), "attachment; filename=\"spinaltap-" + small_.case_id + ".stl\"");
+  EXPECT_EQ(stl.body.size(), 84U + 50U) << "one triangle";
+  EXPECT_EQ(ply.header("content-type"), "application/octet-stream");
+  EXPECT_EQ(ply.body.rfind("ply\n", 0), 0U);
+  for (const auto& [url, whole] : {std::pair(caseUrl("/mesh.stl"), stl), std::pair(caseUrl("/mesh.ply"), ply)}) {
+    const auto* data = reinterpret_cast<const std::byte*>(whole.body.data());
+    EXPECT_EQ(whole.header("etag"), "\"" + store::blobIdOf({data, whole.body.size()}) + "\"");
+    EXPECT_EQ(get(port(), url, {"If-None-Match: " + whole.header("etag")}).status, 304);
+    const Reply part = get(port(), url, {"Range: bytes=2-11"});
+    EXPECT_EQ(part.status, 206);
+    EXPECT_EQ(part.body, whole.body.substr(2, 10));
+  }
+  expectProblem(get(port(), "/api/v1/cases/" + bare_ + "/mesh.stl"), 404);
+  expectProblem(get(port(), "/api/v1/cases/czzzzzzz/mesh.ply"), 404);
+  expectProblem(get(port(), caseUrl("/mesh.obj")), 404);
+}
+
 TEST_F(Rest, AnswersAKnownTagWith304AndNoBody) {
   const std::string tag = get(port(), caseUrl("/mesh")).header("etag");
   for (const std::string& sent : {tag, "W/" + tag, "\"other\", " + tag, std::string("*")}) {

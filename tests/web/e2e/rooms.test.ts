@@ -133,6 +133,24 @@ describe("a case", () => {
     await keepPicture(page, "case");
   });
 
+  test("its surface can be saved for other programs", async () => {
+    await firstCase();
+    const saved = async (name: string): Promise<Buffer> => {
+      const link = page.getByRole("link", { name, exact: true });
+      expect(await link.getAttribute("download"), "is saved, not shown").not.toBeNull();
+      const answer = await page.request.get(`${served.address}${await link.getAttribute("href")}`);
+      expect(answer.status()).toBe(200);
+      expect(answer.headers()["content-disposition"]).toContain(`.${name.toLowerCase()}"`);
+      return answer.body();
+    };
+    const stl = await saved("STL");
+    const triangles = stl.readUInt32LE(80);
+    expect(triangles).toBeGreaterThan(10_000);
+    expect(stl.length).toBe(84 + 50 * triangles);
+    const ply = await saved("PLY");
+    expect(ply.subarray(0, 400).toString("latin1")).toContain(`element face ${triangles}\n`);
+  });
+
   test("a click in one slice moves the others, and shows bone's HU", async () => {
     const slider = (plane: string) => page.getByLabel(`${plane} position`);
     const before = await slider("Coronal").inputValue();

@@ -58,6 +58,9 @@ export function fetchCase(id: string): Promise<CaseDetail> {
 export async function fetchMesh(id: string): Promise<MeshBody> {
   return decodeMesh(await bytes(`/cases/${part(id)}/mesh`));
 }
+export function meshFileUrl(id: string, format: "stl" | "ply"): string {
+  return `/api/v1/cases/${part(id)}/mesh.${format}`;
+}
 export async function fetchVolume(id: string): Promise<VolumeBody> {
   return decodeVolume(await bytes(`/cases/${part(id)}/volume`));
 }

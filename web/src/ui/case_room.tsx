@@ -7,6 +7,7 @@ import { bitSolid, holeSolid } from "../geometry/section";
 import { kBoneWindow, kPlanes, type Window } from "../geometry/slice";
 import { add, mix, scale, toPatient } from "../geometry/vec";
 import type { VertebraScene } from "../scene/vertebra_scene";
+import { meshFileUrl } from "../state/api";
 import { type CaseData, loadCase, pathOf } from "../state/case_data";
 import { useLoaded } from "../state/load";
 import { addressOf, goTo } from "../state/route";
@@ -52,6 +53,7 @@ function Opened({ data, path_id }: { data: CaseData; path_id: string | null }) {
         <Paths detail={detail} chosen={path} />
         <Recordings detail={detail} />
         <Figures figures={detail.figures} />
+        <Downloads case_id={detail.id} />
       </aside>
     </div>
   );
@@ -239,6 +241,21 @@ function recordingText(detail: CaseDetail, recording: RecordingInfo): string {
   const parts = [path?.label ?? recording.path_id, `${(recording.cycles / 1000).toFixed(1)} s`];
   if (!recording.complete) parts.push("cut short");
   return parts.join(" · ");
+}
+
+function Downloads({ case_id }: { case_id: string }) {
+  return (
+    <p class="dim">
+      Download the surface, in mm:{" "}
+      <a href={meshFileUrl(case_id, "stl")} download>
+        STL
+      </a>
+      {" · "}
+      <a href={meshFileUrl(case_id, "ply")} download>
+        PLY
+      </a>
+    </p>
+  );
 }
 
 const kFigureNames: [string, string, string][] = [
