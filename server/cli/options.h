@@ -7,7 +7,6 @@
 
 #include "core/base/vec3.h"
 #include "core/plan/path.h"
-#include "core/segment/segment.h"
 #include "core/surface/defaults.h"
 #include "server/jobs/plan_job.h"
 
@@ -27,9 +26,8 @@ struct ImportOptions {
 
 struct SegmentOptions {
   std::string data, case_id, seed;
-  double threshold_HU = 150;
-  std::string half_box, box_offset;
-  double neck_mm = 0, closing_mm = 1.5;
+  std::optional<double> threshold_HU;
+  bool grow = false;
 };
 
 struct ReconstructOptions {

@@ -73,21 +73,13 @@ void addImport(Program& program) {
 void addSegment(Program& program) {
   auto o = std::make_shared<SegmentOptions>();
   CLI::App* sub =
-      add(program, "segment", "Find the vertebra's voxels: an imported label is kept, a seed grows", o, runSegment);
+      add(program, "segment", "Find the vertebra's voxels: from one click, or keep an imported label", o, runSegment);
   sub->add_option("CASE", o->case_id, "Case id")->required();
   CLI::Option* seed =
-      sub->add_option("--seed", o->seed, "x,y,z in the bone, e.g. in the middle of the body")->check(kVec3);
-  sub->add_option("--threshold", o->threshold_HU, "HU from which on it is bone")->needs(seed)->capture_default_str();
-  sub->add_option("--half-box", o->half_box, "x,y,z: growth stays this far from the box's centre (default: no limit)")
-      ->needs(seed)
-      ->check(kVec3);
-  sub->add_option("--box-offset", o->box_offset, "x,y,z: the box's centre, from the seed")->needs(seed)->check(kVec3);
-  sub->add_option("--neck", o->neck_mm, "Bridges narrower than twice this are cut, mm")
-      ->needs(seed)
-      ->capture_default_str();
-  sub->add_option("--closing", o->closing_mm, "Gaps in the cortex up to twice this are bridged, mm")
-      ->needs(seed)
-      ->capture_default_str();
+      sub->add_option("--seed", o->seed, "x,y,z in the middle of the wanted vertebral body")->check(kVec3);
+  sub->add_option("--threshold", o->threshold_HU, "HU from which on it is bone (default: measured; 150 to grow)")
+      ->needs(seed);
+  sub->add_flag("--grow", o->grow, "Take all bone that hangs together with the seed, whatever bone it is")->needs(seed);
   sub->add_option("--data", o->data, kDataHelp);
 }
 

@@ -5,29 +5,20 @@
 namespace spinaltap::cli {
 namespace {
 
-Result<void> readVec3(const std::string& text, const char* option, Vec3& into) {
-  if (text.empty()) return {};
-  const auto value = parseVec3(text, option);
-  if (!value) return tl::unexpected(value.error());
-  into = *value;
-  return {};
-}
-
 Result<jobs::SegmentJob> jobOf(const SegmentOptions& options) {
-  jobs::SegmentJob job{options.case_id, {}};
+  jobs::SegmentJob job{options.case_id, {}, {}};
   if (options.seed.empty()) return job;
-  segment::GrowOptions grow;
-  grow.threshold_hu = options.threshold_HU;
-  grow.neck_mm = options.neck_mm;
-  grow.closing_mm = options.closing_mm;
-  if (const auto read = readVec3(options.seed, "--seed", grow.seed_patient); !read) return tl::unexpected(read.error());
-  if (const auto read = readVec3(options.half_box, "--half-box", grow.half_box_mm); !read) {
-    return tl::unexpected(read.error());
+  const auto seed = parseVec3(options.seed, "--seed");
+  if (!seed) return tl::unexpected(seed.error());
+  if (options.grow) {
+    job.grow.emplace();
+    job.grow->seed_patient = *seed;
+    if (options.threshold_HU) job.grow->threshold_hu = *options.threshold_HU;
+  } else {
+    job.isolate.emplace();
+    job.isolate->seed_patient = *seed;
+    if (options.threshold_HU) job.isolate->threshold_hu = *options.threshold_HU;
   }
-  if (const auto read = readVec3(options.box_offset, "--box-offset", grow.box_offset_mm); !read) {
-    return tl::unexpected(read.error());
-  }
-  job.grow = grow;
   return job;
 }
 

@@ -102,8 +102,9 @@ TEST_F(EndToEnd, ALabelledScanBecomesAHole) {
 TEST_F(EndToEnd, AScannersOwnSlicesBecomeAHole) {
   if (!fs::exists(ct_)) GTEST_SKIP() << "the folder of shared data is absent";
   const std::string id = json({"import", "--from", ct_ / "pancreas-cb-001" / "dicom"})["case_id"];
-  std::ignore = json(
-      {"segment", id, "--seed", "6,110,220", "--threshold", "200", "--half-box", "52,50,18", "--box-offset", "0,22,1"});
+  const Json segmented = json({"segment", id, "--seed", "6,110,220"});
+  EXPECT_EQ(segmented["actions"], 1);
+  EXPECT_EQ(segmented["neighbours"].size(), 2U);
   std::ignore = json({"reconstruct", id});
   const Json drilled = drillAndReplay(id, "-17.1,144.2,224.6", "-0.2,112.0,225.0");
   EXPECT_EQ(drilled["gertzbein_robbins"], "A");

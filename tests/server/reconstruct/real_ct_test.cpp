@@ -11,6 +11,7 @@
 #include "core/mesh/parts.h"
 #include "core/mesh/polygonise.h"
 #include "core/rbf/rbf.h"
+#include "core/segment/isolate.h"
 #include "core/segment/segment.h"
 #include "core/surface/surface.h"
 #include "server/import/import.h"
@@ -104,17 +105,16 @@ TEST(RealCt, ALabelledLumbarVertebraBecomesAClosedSurface) {
   EXPECT_GT(at(made->field, {-22, 195, -124}), 3) << "the canal";
 }
 
-TEST(RealCt, AScannersOwnSlicesAreGrownFromASeedInABox) {
+TEST(RealCt, AScannersOwnSlicesAreSegmentedFromOneClick) {
   NEED_SHARED_DATA();
   const auto scan = import("pancreas-cb-001/dicom");
   ASSERT_TRUE(scan.has_value()) << scan.error().message;
-  segment::GrowOptions grow;
-  grow.seed_patient = {6, 110, 220};  // the body of L3
-  grow.threshold_hu = 200;            // above the contrast medium in the vessels
-  grow.half_box_mm = {52, 50, 18};
-  grow.box_offset_mm = {0, 22, 1};
-  const auto label = segment::growFromSeed(scan->ct, grow);
-  ASSERT_TRUE(label.has_value()) << label.error().message;
+  segment::IsolateOptions click;
+  click.seed_patient = {6, 110, 220};  // the body of L3
+  const auto found = segment::isolate(scan->ct, click);
+  ASSERT_TRUE(found.has_value()) << found.error().message;
+  EXPECT_EQ(found->neighbours.size(), 2U);
+  const auto* label = &found->label;
   const auto made = reconstruct(scan->ct, *label);
   ASSERT_TRUE(made.has_value()) << made.error().message;
   expectClosedBone(*made);

@@ -1,0 +1,147 @@
+#include "core/segment/ownership.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/segment/valley.h"
+
+namespace spinaltap::segment {
+namespace {
+
+constexpr int kUnit = 10;                        // of cost: one step through bright bone
+constexpr double kDark = 11, kValley = 30;       // what darkness and a valley add, in steps
+constexpr double kValley_hu = 120;               // HU per mm^2: a joint space a voxel wide between cortices
+constexpr std::uint32_t kFarthest = 80 * kUnit;  // an L3's farthest tip lies some 50 mm from its seeds
+constexpr double kSeedDepth_mm = 2;
+constexpr double kSpan = 2.6;  // half the span of the transverse processes is at most this many half widths of the body
+// From pedicle to facet it is shorter than from lamina to facet by about this. Where a joint space cannot be seen at
+// all two floods meet midway, so the pedicles set out later.
+constexpr std::uint16_t kPedicleStart = 8 * kUnit;
+
+std::vector<std::uint16_t> costs(const Scene& scene, const std::vector<float>& hu, double threshold_hu) {
+  const std::vector<float> softer = blurred(scene.block, scene.block.hu, 0.8, scene.threads);
+  const double least = 0.5 * threshold_hu;
+  const std::vector<float> valley = valleyDepth(scene.block, softer, 0, scene.threads);
+  std::vector<std::uint16_t> cost(hu.size(), kWall);
+  for (std::size_t v = 0; v < hu.size(); ++v) {
+    if (scene.block.known[v] == 0 || hu[v] < least) continue;
+    const double bright = std::clamp((hu[v] - 0.4 * threshold_hu) / (0.8 * threshold_hu), 0.0, 1.0);
+    const double deep = std::min(1.0, valley[v] / kValley_hu);
+    cost[v] =
+        static_cast<std::uint16_t>(std::lround(kUnit * (1 + kDark * (1 - bright) * (1 - bright) + kValley * deep)));
+  }
+  return cost;
+}
+
+/// Pedicles leave the upper half of the body, thoracic and lumbar alike. @param canal, p  in the body's frame.
+bool inPedicle(const Body& body, const Vec3& canal, const Vec3& p) {
+  return std::abs(p.x - canal.x) < body.half_width_mm + 1 && p.y > body.back_mm - 3 && p.y < canal.y && p.z > 0 &&
+         p.z < 0.4 * body.height_mm;
+}
+
+class Seeds {
+ public:
+  Seeds(const Scene& scene, const std::vector<float>& hu, double threshold_hu, Flood& flood)
+      : scene_(scene), hu_(hu), threshold_hu_(threshold_hu), flood_(flood) {}
+
+  /// The column between the plates, and the pedicles. Of a likeness only what is bone.
+  void sowBody(const Body& body, std::uint8_t owner, bool only_bone) {
+    const Block& block = scene_.block;
+    const Vec3 canal = body.canal ? body.frame.toLocal(*body.canal) : Vec3{};
+    std::size_t v = 0;
+    for (int k = 0; k < block.dims[2]; ++k) {
+      for (int j = 0; j < block.dims[1]; ++j) {
+        for (int i = 0; i < block.dims[0]; ++i, ++v) {
+          const Vec3 p = body.frame.toLocal(block.place(i, j, k));
+          if (std::abs(p.z) > body.height_mm || block.known[v] == 0) continue;
+          const bool bone = hu_[v] > threshold_hu_;
+          const bool column = (bone || !only_bone) && depthIn(body, p).least() > kSeedDepth_mm;
+          if (!column && !(bone && body.canal && inPedicle(body, canal, p))) continue;
+          flood_.owner[v] = owner;
+          flood_.start[v] = kPedicleStart;
+          if (column) flood_.cost[v] = kUnit;  // marrow may be dark
+        }
+      }
+    }
+  }
+
+  /// Bone too far to the side for a transverse process: ribs, ilium.
+  void sowSides(const Body& body) {
+    const Block& block = scene_.block;
+    std::size_t v = 0;
+    for (int k = 0; k < block.dims[2]; ++k) {
+      for (int j = 0; j < block.dims[1]; ++j) {
+        for (int i = 0; i < block.dims[0]; ++i, ++v) {
+          if (flood_.cost[v] == kWall || flood_.owner[v] != kNobody || hu_[v] < threshold_hu_) continue;
+          if (std::abs(body.frame.toLocal(block.place(i, j, k)).x) < kSpan * body.half_width_mm) continue;
+          flood_.owner[v] = kOther;
+          flood_.start[v] = 0;
+        }
+      }
+    }
+  }
+
+  /// The first bone behind the canal, near the middle plane: the lamina lies there at the height of the body's lower
+  /// half.
+  void sowLamina(const Body& body, std::uint8_t owner) {
+    if (!body.canal) return;
+    const Vec3 canal = body.frame.toLocal(*body.canal);
+    for (double z = -0.45 * body.height_mm; z <= -0.15 * body.height_mm; z += 0.5) {
+      for (double x = -2; x <= 2; x += 0.5) sowBehind(body, {canal.x + x, canal.y, z}, owner);
+    }
+  }
+
+ private:
+  void sowBehind(const Body& body, const Vec3& start, std::uint8_t owner) {
+    constexpr double kReach_mm = 22, kThick_mm = 4;
+    double bone_mm = 0;
+    for (double y = 0; y < kReach_mm && bone_mm < kThick_mm; y += 0.5) {
+      const Vec3 place = body.frame.toPatient({start.x, start.y + y, start.z});
+      if (!isKnown(scene_.block, place)) return;
+      if (valueAt(scene_.block, hu_, place) < threshold_hu_) {
+        if (bone_mm > 0) return;
+        continue;
+      }
+      bone_mm += 0.5;
+      const Vec3 at = scene_.block.voxelAt(place);
+      const std::size_t v = scene_.block.index(static_cast<int>(std::lround(at.x)), static_cast<int>(std::lround(at.y)),
+                                               static_cast<int>(std::lround(at.z)));
+      flood_.owner[v] = owner;
+      flood_.start[v] = 0;
+    }
+  }
+
+  const Scene& scene_;
+  const std::vector<float>& hu_;
+  double threshold_hu_;
+  Flood& flood_;
+};
+
+/// Gives owners to voxels near owned ones that the flood did not enter, so that the edge can be drawn anywhere.
+void spread(const Block& block, std::vector<std::uint8_t>& owner) {
+  constexpr std::uint32_t kSteps = 3;
+  owner = compete({block.dims, std::vector<std::uint16_t>(owner.size(), kUnit), owner}, kSteps * kUnit).owner;
+}
+
+}  // namespace
+
+Ownership shareBone(const Scene& scene, const Spine& spine, double threshold_hu) {
+  const std::vector<float> hu = blurred(scene.block, scene.block.hu, 0.4, scene.threads);
+  const std::size_t voxels = hu.size();
+  Flood flood{scene.block.dims, costs(scene, hu, threshold_hu), std::vector<std::uint8_t>(voxels, kNobody),
+              std::vector<std::uint16_t>(voxels, 0)};
+  Seeds seeds(scene, hu, threshold_hu, flood);
+  seeds.sowBody(spine.wanted, kWanted, false);
+  seeds.sowBody(spine.above.body, kAbove, !spine.above.found);
+  seeds.sowBody(spine.below.body, kBelow, !spine.below.found);
+  seeds.sowLamina(spine.wanted, kWanted);
+  seeds.sowLamina(spine.above.body, kAbove);
+  seeds.sowLamina(spine.below.body, kBelow);
+  seeds.sowSides(spine.wanted);
+  Ownership out{compete(flood, kFarthest).owner};
+  spread(scene.block, out.owner);
+  return out;
+}
+
+}  // namespace spinaltap::segment
