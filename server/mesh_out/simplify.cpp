@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <string>
 
@@ -19,7 +20,7 @@ using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 // The library's error is about a root mean square; on bone half of what is allowed leaves few places beyond it.
 constexpr double kFirst = 0.5, kTighter = 0.7, kLast = 0.01;
-constexpr int kMostRounds = 8;
+constexpr int kMostRounds = 16;
 constexpr double kMostKept = 0.1;  // of all triangles
 
 class Simplifier {
@@ -92,17 +93,54 @@ class Simplifier {
     return made;
   }
 
-  /// Old vertices where the made mesh is not manifold or one surface is too far from the other.
-  [[nodiscard]] std::vector<std::uint32_t> faultsOf(const TriangleMesh& made) const {
+  /// The library may fold a thin triangle over; then it faces against what its corners were part of.
+  [[nodiscard]] bool isFolded(const std::array<std::uint32_t, 3>& t) const {
+    const Vec3& a = mesh_.vertices[t[0]];
+    const Vec3 facing = cross(mesh_.vertices[t[1]] - a, mesh_.vertices[t[2]] - a);
+    return !(dot(facing, mesh_.normals[t[0]] + mesh_.normals[t[1]] + mesh_.normals[t[2]]) > 0);
+  }
+
+  /// Old vertices where the made mesh is not manifold or folded; where it is neither, where one surface is too far from
+  /// the other, which takes ten times as long to tell.
+  [[nodiscard]] std::vector<std::uint32_t> faultsOf(const TriangleMesh& made) {
     std::vector<std::uint32_t> all(mesh_.vertices.size());
     for (std::uint32_t v = 0; v < all.size(); ++v) all[v] = v;
+    if (made.triangles.empty()) return all;
     std::vector<std::uint32_t> faults = mesh::pinchedVertices(made, all);
     const auto add = [&](const std::array<std::uint32_t, 3>& t) { faults.insert(faults.end(), t.begin(), t.end()); };
-    for (const std::uint32_t t : farTriangles(made, grid_, max_error_mm_)) add(made.triangles[t]);
-    if (made.triangles.empty()) return all;
+    for (const auto& t : made.triangles) {
+      if (isFolded(t)) add(t);
+    }
+    if (growsKept(faults)) return faults;
+    for (const auto& t : farFromTheOld(made)) add(t);
     const TriangleGrid made_grid(made, max_error_mm_);
     for (const std::uint32_t t : farTriangles(mesh_, made_grid, max_error_mm_)) add(mesh_.triangles[t]);
     return faults;
+  }
+
+  /// Only those that no round before has had: most triangles come again, and the old mesh stays.
+  [[nodiscard]] Triangles farFromTheOld(const TriangleMesh& made) {
+    Triangles all = made.triangles;
+    for (auto& t : all) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+    std::sort(all.begin(), all.end());
+    TriangleMesh fresh{mesh_.vertices, {}, {}};
+    std::set_difference(all.begin(), all.end(), near_.begin(), near_.end(), std::back_inserter(fresh.triangles));
+    Triangles far, near_too;
+    for (const std::uint32_t t : farTriangles(fresh, grid_, max_error_mm_)) far.push_back(fresh.triangles[t]);
+    std::set_difference(fresh.triangles.begin(), fresh.triangles.end(), far.begin(), far.end(),
+                        std::back_inserter(near_too));
+    Triangles merged;
+    std::merge(near_.begin(), near_.end(), near_too.begin(), near_too.end(), std::back_inserter(merged));
+    near_ = std::move(merged);
+    return far;
+  }
+
+  /// Whether a triangle at these vertices is not kept yet. An old mesh's own faults are left as they are.
+  [[nodiscard]] bool growsKept(const std::vector<std::uint32_t>& vertices) const {
+    return std::any_of(vertices.begin(), vertices.end(), [this](std::uint32_t v) {
+      return std::any_of(around_.begin() + first_[v], around_.begin() + first_[v + 1],
+                         [this](std::uint32_t t) { return !keep_[t]; });
+    });
   }
 
   void keepAround(const std::vector<std::uint32_t>& vertices) {
@@ -136,6 +174,7 @@ class Simplifier {
   TriangleGrid grid_;
   std::vector<float> positions_;               ///< #V by 3, from the first vertex
   std::vector<std::uint32_t> first_, around_;  ///< triangles at each vertex
+  Triangles near_;                             ///< proved to be near the old mesh; sorted, lowest vertex first
   std::vector<bool> keep_;                     ///< #T: as they are
 };
 

@@ -150,6 +150,15 @@ std::vector<Simplified> meshesToSimplify() {
   return {{"phantom", std::move(bone).value()}, {"rippled torus", std::move(rippled).value()}};
 }
 
+/// Facing against the corners' normals; a surface rougher than its cells has a few from the start.
+std::size_t countFolded(const TriangleMesh& mesh) {
+  return static_cast<std::size_t>(std::count_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& t) {
+    const Vec3& a = mesh.vertices[t[0]];
+    const Vec3 facing = cross(mesh.vertices[t[1]] - a, mesh.vertices[t[2]] - a);
+    return !(dot(facing, mesh.normals[t[0]] + mesh.normals[t[1]] + mesh.normals[t[2]]) > 0);
+  }));
+}
+
 TEST(Simplify, KeepsItsErrorBothWaysAndAClosedManifold) {
   Random random(31);
   for (const Simplified& given : meshesToSimplify()) {
@@ -166,7 +175,8 @@ TEST(Simplify, KeepsItsErrorBothWaysAndAClosedManifold) {
       EXPECT_EQ(after.euler, before.euler);
       EXPECT_EQ(after.parts, before.parts);
       EXPECT_NEAR(after.volume_mm3, before.volume_mm3, error_mm * before.area_mm2);
-      EXPECT_EQ(made->normals.size(), made->vertices.size());
+      ASSERT_EQ(made->normals.size(), made->vertices.size());
+      EXPECT_LE(countFolded(*made), countFolded(given.mesh));
       const double out = farthest(pointsOn(*made, 500, random), given.mesh);
       const double back = farthest(pointsOn(given.mesh, 500, random), *made);
       EXPECT_LE(out, error_mm);
