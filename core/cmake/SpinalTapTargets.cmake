@@ -28,6 +28,14 @@ else()
   target_link_libraries(spinaltap_flags INTERFACE Threads::Threads)
 endif()
 
+# Highway: every inner loop once for each of a few vector widths, chosen at run time; in the browser the one it has.
+add_library(spinaltap_simd INTERFACE)
+target_compile_definitions(spinaltap_simd INTERFACE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_AVX3_DL)")
+if(NOT EMSCRIPTEN)
+  find_library(HIGHWAY hwy REQUIRED)
+  target_link_libraries(spinaltap_simd INTERFACE ${HIGHWAY})
+endif()
+
 # spinaltap_module(core rbf DEPS base): a static library spinaltap_core_rbf of every .cpp in its own folder.
 function(spinaltap_module room name)
   cmake_parse_arguments(ARG "" "" "DEPS;LIBRARIES" ${ARGN})

@@ -1,217 +1,159 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <limits>
+#include <cstdio>
+#include <optional>
 #include <string>
-#include <unordered_map>
-#include <vector>
 
+#include "core/rbf/direct_sum.h"
 #include "core/rbf/prepare.h"
 #include "core/rbf/rbf.h"
-#include "core/rbf/solver.h"
-#include "core/rbf/summation.h"
+#include "core/rbf/reduce.h"
+#include "core/rbf/smoothing.h"
+#include "core/rbf/system.h"
 
 namespace spinaltap::rbf {
 namespace {
 
-constexpr std::size_t kFirstCentres = 50;
-// Each round adds this share of the centres so far: more would pick crowds around one bad spot, less costs rounds.
-constexpr double kGrowth = 0.3;
-constexpr int kAveragingRounds = 4;
-constexpr std::size_t kMostCentres = 20'000;  // 3.2 GB of factor, and an hour: beyond this, dense is the wrong way
+// With reduction, the full fit is only a step on the way and need not be closer than this share of what it allows.
+constexpr double kFullFitShare = 0.2;
 
-/// Refuses points closer than a radius to one already taken (cells as wide as the radius, 27 looked at).
-class Spacing {
+Result<void> checkOptions(const FitOptions& o) {
+  if (!(o.tolerance_mm > 0) || !std::isfinite(o.tolerance_mm)) {
+    return fail(ErrorCode::InvalidArgument, "fit tolerance is not positive and finite");
+  }
+  if (!(o.smoothing >= 0 || o.smoothing == kAutoSmoothing) || !std::isfinite(o.smoothing)) {
+    return fail(ErrorCode::InvalidArgument, "fit smoothing is negative or not finite");
+  }
+  if (!(o.reduce_mm >= 0) || !std::isfinite(o.reduce_mm)) {
+    return fail(ErrorCode::InvalidArgument, "the reduction's tolerance is negative or not finite");
+  }
+  return {};
+}
+
+std::string shortNumber(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", x);
+  return text;
+}
+
+/// A part of a whole job's progress.
+Progress part(const Progress& progress, double from, double to) {
+  if (!progress) return {};
+  return [&progress, from, to](double fraction) { progress(from + (to - from) * fraction); };
+}
+
+/// Positions in units of the set, back to the user's.
+Model modelOf(const PreparedSamples& s, const std::vector<Vec3>& centres, const SystemSolution& solution) {
+  Model m;
+  m.centroid_patient = s.centroid_patient;
+  m.radius_mm = s.radius_mm;
+  for (const Vec3& c : centres) m.centres.push_back(c * s.scale_mm);
+  for (const double u : solution.weights) m.weights.push_back(-u / s.scale_mm);
+  m.constant = solution.polynomial[0];
+  m.linear = Vec3{solution.polynomial[1], solution.polynomial[2], solution.polynomial[3]} / s.scale_mm;
+  return m;
+}
+
+/// Of the samples as they were given, by direct summation. Where no sample was merged or left out as a centre, they are
+/// the centres, and every distance serves twice.
+void measureResiduals(const Samples& samples, const Model& model, unsigned threads, FitReport& report) {
+  const std::size_t all = samples.positions.size();
+  const bool own_centres = model.centres.size() == all && all * all <= kDirectPairs;
+  const std::size_t affordable = std::max<std::size_t>(1000, kDirectPairs / model.centres.size());
+  report.residual_samples = std::min(all, affordable);
+  const auto chosen = [&](std::size_t n) { return n * all / report.residual_samples; };
+  std::vector<double> values(report.residual_samples);
+  if (own_centres) {
+    values = distancesAmong(Coordinates(model.centres), model.weights, threads);
+    for (std::size_t i = 0; i < all; ++i) values[i] += model.constant + dot(model.linear, model.centres[i]);
+  } else {
+    std::vector<Vec3> points(report.residual_samples);
+    for (std::size_t n = 0; n < points.size(); ++n) points[n] = samples.positions[chosen(n)];
+    evaluate(model, points, values, threads);
+  }
+  double squares = 0;
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    const double e = values[n] - samples.distances_mm[chosen(n)];
+    report.residual_max_mm = std::max(report.residual_max_mm, std::abs(e));
+    squares += e * e;
+  }
+  report.residual_rms_mm = std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+class Fitting {
  public:
-  explicit Spacing(double radius) : radius_(radius) {}
+  Fitting(const Samples& samples, const FitOptions& options, const Progress& progress)
+      : samples_(samples), options_(options), progress_(progress) {}
 
-  bool take(const Vec3& p) {
-    const std::int64_t i = cell(p.x), j = cell(p.y), k = cell(p.z);
-    for (std::int64_t dk = -1; dk <= 1; ++dk)
-      for (std::int64_t dj = -1; dj <= 1; ++dj)
-        for (std::int64_t di = -1; di <= 1; ++di)
-          if (crowded(key(i + di, j + dj, k + dk), p)) return false;
-    cells_[key(i, j, k)].push_back(p);
-    return true;
-  }
-
- private:
-  [[nodiscard]] std::int64_t cell(double x) const { return static_cast<std::int64_t>(std::floor(x / radius_)); }
-  static std::int64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
-    return ((i & 0x1fffff) << 42) | ((j & 0x1fffff) << 21) | (k & 0x1fffff);
-  }
-  [[nodiscard]] bool crowded(std::int64_t at, const Vec3& p) const {
-    const auto found = cells_.find(at);
-    if (found == cells_.end()) return false;
-    return std::any_of(found->second.begin(), found->second.end(),
-                       [&](const Vec3& q) { return norm(q - p) < radius_; });
-  }
-
-  double radius_;
-  std::unordered_map<std::int64_t, std::vector<Vec3>> cells_;
-};
-
-/// One greedy fit in progress.
-class Greedy {
- public:
-  Greedy(PreparedSamples samples, const FitOptions& options)
-      : samples_(std::move(samples)),
-        options_(options),
-        most_(std::min(options.max_centres, samples_.positions.size())),
-        solver_(samples_.span_mm, options.smoothing, most_),
-        taken_(samples_.positions.size(), 0),
-        residuals_(samples_.positions.size(), 0.0) {}
-
-  Result<Fit> run(const Progress& progress) {
-    if (auto ok = add(firstCentres()); !ok) return tl::unexpected(ok.error());
-    while (true) {
-      if (auto ok = refit(); !ok) return tl::unexpected(ok.error());
-      if (progress) progress(static_cast<double>(solver_.size()) / static_cast<double>(most_));
-      const std::vector<std::size_t> worst = worstSamples();
-      if (worst.empty()) break;
-      if (auto ok = add(worst); !ok) return tl::unexpected(ok.error());
+  Result<Fit> run() {
+    auto prepared = prepare(samples_);
+    if (!prepared) return tl::unexpected(prepared.error());
+    prepared_ = std::move(*prepared);
+    chooseRidge();
+    if (auto ok = solveFull(); !ok) return tl::unexpected(ok.error());
+    std::vector<Vec3> centres = prepared_.positions;
+    if (options_.reduce_mm > 0) {
+      if (auto ok = reduceTo(centres); !ok) return tl::unexpected(ok.error());
     }
-    if (options_.smoothing > 0) {
-      if (auto ok = averageNoise(); !ok) return tl::unexpected(ok.error());
-    }
-    if (progress) progress(1.0);
-    return finish();
-  }
-
- private:
-  /// Farthest points first: an even spread, never in one plane when the samples are not.
-  [[nodiscard]] std::vector<std::size_t> firstCentres() const {
-    const auto& p = samples_.positions;
-    std::vector<double> distance(p.size(), std::numeric_limits<double>::infinity());
-    std::vector<std::size_t> out{0};
-    while (out.size() < std::min(kFirstCentres, most_)) {
-      for (std::size_t i = 0; i < p.size(); ++i) distance[i] = std::min(distance[i], norm(p[i] - p[out.back()]));
-      const auto farthest = std::max_element(distance.begin(), distance.end());
-      out.push_back(static_cast<std::size_t>(farthest - distance.begin()));
-    }
-    return out;
-  }
-
-  Result<void> add(const std::vector<std::size_t>& chosen) {
-    std::vector<Vec3> positions;
-    for (const std::size_t i : chosen) {
-      positions.push_back(samples_.positions[i]);
-      targets_.push_back(samples_.distances[i]);
-      taken_[i] = 1;
-    }
-    return solver_.add(positions);
-  }
-
-  Result<void> refit() {
-    auto solution = solver_.solve(targets_);
-    if (!solution) return tl::unexpected(solution.error());
-    model_.centres = solver_.centres();
-    model_.weights = std::move(solution->weights);
-    model_.constant = solution->constant;
-    model_.linear = solution->linear;
-    sumValues(FlatModel(model_), samples_.positions, residuals_);
-    for (std::size_t i = 0; i < residuals_.size(); ++i) residuals_[i] -= samples_.distances[i];
-    return {};
-  }
-
-  /// The next centres: the worst samples beyond the tolerance that do not crowd each other. Empty when done.
-  [[nodiscard]] std::vector<std::size_t> worstSamples() const {
-    std::vector<std::size_t> order;
-    for (std::size_t i = 0; i < residuals_.size(); ++i) {
-      if (taken_[i] == 0 && std::abs(residuals_[i]) > options_.tolerance_mm) order.push_back(i);
-    }
-    std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
-      const double ra = std::abs(residuals_[a]), rb = std::abs(residuals_[b]);
-      return ra != rb ? ra > rb : a < b;
-    });
-    const double n = static_cast<double>(solver_.size());
-    const std::size_t room = most_ - solver_.size();
-    const std::size_t wanted = std::min(room, static_cast<std::size_t>(std::ceil(kGrowth * n)));
-    // n centres spread over a surface as large as the span squared are about this far apart.
-    Spacing spacing(0.5 * samples_.span_mm / std::sqrt(n));
-    std::vector<std::size_t> out;
-    for (const std::size_t i : order) {
-      if (out.size() == wanted) break;
-      if (spacing.take(samples_.positions[i])) out.push_back(i);
-    }
-    return out;
-  }
-
-  /// A centre's value comes from one noisy sample; its neighbours know better. Moves every centre's target by the mean
-  /// residual of the samples nearest to it and solves again, a few times: the model then meets local means.
-  Result<void> averageNoise() {
-    const std::vector<std::size_t> nearest = nearestCentres();
-    for (int round = 0; round < kAveragingRounds; ++round) {
-      std::vector<double> sum(targets_.size(), 0.0), count(targets_.size(), 0.0);
-      for (std::size_t i = 0; i < nearest.size(); ++i) sum[nearest[i]] += residuals_[i], count[nearest[i]] += 1;
-      for (std::size_t c = 0; c < targets_.size(); ++c) targets_[c] -= sum[c] / std::max(1.0, count[c]);
-      if (auto ok = refit(); !ok) return ok;
-    }
-    return {};
-  }
-
-  [[nodiscard]] std::vector<std::size_t> nearestCentres() const;
-
-  [[nodiscard]] Fit finish() {
-    Fit fit;
+    Fit fit{modelOf(prepared_, centres, solution_), report_};
     FitReport& r = fit.report;
-    r.samples = samples_.positions.size();
-    r.centres = solver_.size();
-    double squares = 0;
-    for (const double e : residuals_) {
-      r.residual_max_mm = std::max(r.residual_max_mm, std::abs(e));
-      squares += e * e;
-    }
-    r.residual_rms_mm = std::sqrt(squares / static_cast<double>(residuals_.size()));
-    for (const double w : model_.weights) r.sum_abs_weights += std::abs(w);
-    r.reached_tolerance = r.residual_max_mm <= options_.tolerance_mm;
-    model_.centroid_patient = samples_.centroid_patient;
-    fit.model = std::move(model_);
+    r.samples = samples_.positions.size(), r.merged = prepared_.merged, r.centres = centres.size();
+    for (const double w : fit.model.weights) r.sum_abs_weights += std::abs(w);
+    measureResiduals(samples_, fit.model, options_.threads, r);
+    if (progress_) progress_(1.0);
     return fit;
   }
 
-  PreparedSamples samples_;
-  FitOptions options_;
-  std::size_t most_;
-  GrowingSolver solver_;
-  std::vector<std::uint8_t> taken_;
-  std::vector<double> targets_;    ///< #centres: the values the surface is drawn through (or near, with a ridge)
-  std::vector<double> residuals_;  ///< #samples: model minus sample
-  Model model_;                    ///< its centroid stays 0 until the end: the samples are relative already
-};
-
-/// Brute force, centre by centre, over contiguous arrays: a tenth of one refit.
-std::vector<std::size_t> Greedy::nearestCentres() const {
-  const auto& p = samples_.positions;
-  const std::vector<Vec3>& centres = solver_.centres();
-  std::vector<std::size_t> out(p.size(), 0);
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t c = 0; c < centres.size(); ++c) {
-      const Vec3 d = p[i] - centres[c];
-      const double square = dot(d, d);
-      if (square < least) least = square, out[i] = c;
+ private:
+  void chooseRidge() {
+    ridge_ = options_.smoothing / prepared_.scale_mm;
+    if (options_.smoothing == kAutoSmoothing) {
+      report_.noise_mm = estimateNoise(prepared_.positions, prepared_.distances, options_.threads);
+      ridge_ = ridgeFor(report_.noise_mm, prepared_.positions, prepared_.distances, options_.threads);
     }
+    report_.smoothing = ridge_ * prepared_.scale_mm;
   }
-  return out;
-}
+
+  Result<void> solveFull() {
+    const auto system = System::make(prepared_.positions, ridge_, options_.threads);
+    if (!system) return tl::unexpected(system.error());
+    const bool reducing = options_.reduce_mm > 0;
+    const double tolerance =
+        reducing ? std::max(options_.tolerance_mm, kFullFitShare * options_.reduce_mm) : options_.tolerance_mm;
+    solution_ = system->solve(prepared_.distances, tolerance, part(progress_, 0.1, reducing ? 0.4 : 0.9));
+    report_.rounds = solution_.rounds;
+    if (solution_.residual_max <= tolerance) return {};
+    return fail(ErrorCode::NotConverged, "the fit came within " + shortNumber(solution_.residual_max) +
+                                             " of its samples, not within " + shortNumber(tolerance));
+  }
+
+  /// The smooth values at the samples are the given ones less ridge times weight.
+  Result<void> reduceTo(std::vector<Vec3>& centres) {
+    std::vector<double> smooth = prepared_.distances;
+    for (std::size_t i = 0; i < smooth.size(); ++i) smooth[i] -= ridge_ * solution_.weights[i];
+    auto reduced = reduce(prepared_.positions, smooth, options_.reduce_mm, options_.threads, part(progress_, 0.4, 0.9));
+    if (!reduced) return tl::unexpected(reduced.error());
+    centres.clear();
+    for (const std::uint32_t i : reduced->centres) centres.push_back(prepared_.positions[i]);
+    solution_ = std::move(reduced->solution);
+    report_.reduction_max_mm = reduced->largest;
+    return {};
+  }
+
+  const Samples& samples_;
+  const FitOptions& options_;
+  const Progress& progress_;
+  PreparedSamples prepared_;
+  double ridge_ = 0;  ///< in units of the set
+  SystemSolution solution_;
+  FitReport report_;
+};
 
 }  // namespace
 
 Result<Fit> fit(const Samples& samples, const FitOptions& options, const Progress& progress) {
-  if (!(options.tolerance_mm >= 0) || !std::isfinite(options.tolerance_mm)) {
-    return fail(ErrorCode::InvalidArgument, "fit tolerance is negative or not finite");
-  }
-  if (!(options.smoothing >= 0) || !std::isfinite(options.smoothing)) {
-    return fail(ErrorCode::InvalidArgument, "fit smoothing is negative or not finite");
-  }
-  if (std::min(options.max_centres, samples.positions.size()) > kMostCentres) {
-    return fail(ErrorCode::Limit, "a dense fit takes at most " + std::to_string(kMostCentres) + " centres");
-  }
-  if (options.max_centres < 4) return fail(ErrorCode::InvalidArgument, "a fit needs at least 4 centres");
-  auto prepared = prepare(samples);
-  if (!prepared) return tl::unexpected(prepared.error());
-  return Greedy(std::move(*prepared), options).run(progress);
+  if (auto ok = checkOptions(options); !ok) return tl::unexpected(ok.error());
+  return Fitting(samples, options, progress).run();
 }
 
 }  // namespace spinaltap::rbf

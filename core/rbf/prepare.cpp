@@ -3,14 +3,14 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <numeric>
 #include <string>
+#include <utility>
 
 namespace spinaltap::rbf {
 namespace {
 
-constexpr double kMergeShare = 1e-6;  // of the span: a Cholesky factor in double still tells such centres apart
+constexpr double kMergeShare = 1e-4;  // of the usual spacing
 constexpr double kFlatShare = 1e-6;
 
 Result<void> checkSamples(const Samples& samples) {
@@ -34,41 +34,50 @@ void recentre(const Samples& samples, PreparedSamples& out) {
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
   out.centroid_patient = low + (high - low) * 0.5;
-  out.span_mm = norm(high - low);
+  out.scale_mm = norm(high - low);
+  if (!(out.scale_mm > 0)) out.scale_mm = 1;
   out.positions.reserve(samples.positions.size());
-  for (const Vec3& p : samples.positions) out.positions.push_back(p - out.centroid_patient);
+  for (const Vec3& p : samples.positions) {
+    const Vec3 relative = p - out.centroid_patient;
+    out.radius_mm = std::max(out.radius_mm, norm(relative));
+    out.positions.push_back(relative / out.scale_mm);
+  }
   out.distances = samples.distances_mm;
 }
 
-/// Sweep along x: only samples whose x differs by less than the radius can be merged.
-void mergeDuplicates(PreparedSamples& s) {
-  const double radius = kMergeShare * s.span_mm;
-  const std::size_t n = s.positions.size();
-  std::vector<std::size_t> order(n);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&s](std::size_t a, std::size_t b) {
-    return s.positions[a].x != s.positions[b].x ? s.positions[a].x < s.positions[b].x : a < b;
-  });
+/// Sweep along a direction in which the points of a lattice do not coincide: only samples closer than the radius along
+/// it can be merged. leader[i] is the sample that i is merged with, or i.
+std::vector<std::size_t> leadersOf(const std::vector<Vec3>& points, double radius) {
+  const std::size_t n = points.size();
+  const Vec3 direction = normalized({0.5417, 0.7213, 0.4319});
+  std::vector<std::pair<double, std::size_t>> order(n);
+  for (std::size_t i = 0; i < n; ++i) order[i] = {dot(points[i], direction), i};
+  std::sort(order.begin(), order.end());
   std::vector<std::size_t> leader(n);
   std::iota(leader.begin(), leader.end(), std::size_t{0});
-  bool any = false;
   for (std::size_t a = 0; a < n; ++a) {
-    if (leader[order[a]] != order[a]) continue;
-    for (std::size_t b = a + 1; b < n && s.positions[order[b]].x - s.positions[order[a]].x <= radius; ++b) {
-      if (leader[order[b]] == order[b] && norm(s.positions[order[b]] - s.positions[order[a]]) <= radius) {
-        leader[order[b]] = order[a];
-        any = true;
-      }
+    const std::size_t i = order[a].second;
+    if (leader[i] != i) continue;
+    for (std::size_t b = a + 1; b < n && order[b].first - order[a].first <= radius; ++b) {
+      const std::size_t j = order[b].second;
+      if (leader[j] == j && norm(points[j] - points[i]) <= radius) leader[j] = i;
     }
   }
-  if (!any) return;
+  return leader;
+}
+
+void mergeDuplicates(PreparedSamples& s) {
+  const std::size_t n = s.positions.size();
+  const std::vector<std::size_t> leader = leadersOf(s.positions, kMergeShare / std::sqrt(static_cast<double>(n)));
   std::vector<Vec3> position_sum(n);
   std::vector<double> distance_sum(n, 0.0), count(n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
+    s.merged += leader[i] != i ? 1 : 0;
     position_sum[leader[i]] += s.positions[i];
     distance_sum[leader[i]] += s.distances[i];
     count[leader[i]] += 1;
   }
+  if (s.merged == 0) return;
   s.positions.clear(), s.distances.clear();
   for (std::size_t i = 0; i < n; ++i) {
     if (leader[i] != i) continue;
@@ -88,7 +97,7 @@ bool liesInAPlane(const PreparedSamples& s) {
   }
   spread /= static_cast<double>(s.positions.size());
   const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread, Eigen::EigenvaluesOnly).eigenvalues()(0);
-  return !(least > kFlatShare * kFlatShare * s.span_mm * s.span_mm);
+  return !(least > kFlatShare * kFlatShare);
 }
 
 }  // namespace
@@ -97,7 +106,7 @@ Result<PreparedSamples> prepare(const Samples& samples) {
   if (auto ok = checkSamples(samples); !ok) return tl::unexpected(ok.error());
   PreparedSamples out;
   recentre(samples, out);
-  if (!std::isfinite(out.span_mm)) return fail(ErrorCode::NotFinite, "samples are too far apart for double");
+  if (!std::isfinite(out.scale_mm)) return fail(ErrorCode::NotFinite, "samples are too far apart for double");
   mergeDuplicates(out);
   if (out.positions.size() < 4) return fail(ErrorCode::Degenerate, "a surface needs at least 4 different samples");
   if (liesInAPlane(out)) return fail(ErrorCode::Degenerate, "all samples lie in one plane");

@@ -1,10 +1,6 @@
 // core/surface/defaults.h - the settings of a reconstruction, from label to mesh, each with its reason.
 // rbf and mesh do not know them: whoever runs the stages in order passes them on (see README.md).
 #pragma once
-#include <algorithm>
-#include <cstddef>
-
-#include "core/base/vec3.h"
 
 namespace spinaltap::surface {
 
@@ -15,17 +11,10 @@ inline constexpr double kSampleSpacing_mm = 1.0;
 inline constexpr double kNormalRadius_mm = 2.0;
 /// Off-surface samples lie this far along the normals. Larger than the position noise, smaller than half a lamina.
 inline constexpr double kOffset_mm = 1.0;
-/// The fit stops when every sample is met this closely: below the half voxel (0.25 mm) that the mesh must reach.
-inline constexpr double kFitTolerance_mm = 0.15;
-/// Ridge on the kernel's diagonal: averages the boundary points' noise instead of following it.
-inline constexpr double kSmoothing_mm = 0.2;
-/// That ridge for a stack's voxels: the points' error grows with the longest side, and 0.2 is for 0.5 mm. On verse-014
-/// (2 mm) it removes the specks and false tunnels that 0.2 leaves, at 0.02 mm more residual.
-[[nodiscard]] inline double smoothingFor(const Vec3& voxel_mm) {
-  return kSmoothing_mm * std::max(1.0, std::max({voxel_mm.x, voxel_mm.y, voxel_mm.z}) / 0.5);
-}
-/// A dense factorisation of 3000 takes about two seconds on one core and grows with the cube.
-inline constexpr std::size_t kMaxCentres = 3000;
+/// Centres are left out as long as the surface moves by no more than this: a fifth of the voxel that a scan can tell.
+inline constexpr double kFitTolerance_mm = 0.05;
+/// Fast sums may differ by this from direct ones: far below anything else.
+inline constexpr double kFieldTolerance_mm = 1e-3;
 /// Mesh cells: near the voxel size, so that the flat facets add less than 0.05 mm on a radius of 3 mm.
 inline constexpr double kCell_mm = 0.7;
 /// The mesh is sought in the label's box widened by this.

@@ -13,12 +13,15 @@ namespace spinaltap::wire {
 }
 
 /// Reads magic and version 1.
-[[nodiscard]] inline Result<void> readPreamble(ByteReader& in, const char* what, std::uint32_t magic) {
+[[nodiscard]] inline Result<std::uint32_t> readPreamble(ByteReader& in, const char* what, std::uint32_t magic,
+                                                       std::uint32_t newest = 1) {
   const std::uint32_t found = in.u32(), version = in.u32();
   if (in.failed()) return corrupt(what, in.offset(), "ends within its first eight bytes");
   if (found != magic) return corrupt(what, 0, "wrong magic number");
-  if (version != 1) return fail(ErrorCode::Unsupported, std::string(what) + ": version " + std::to_string(version));
-  return {};
+  if (version < 1 || version > newest) {
+    return fail(ErrorCode::Unsupported, std::string(what) + ": version " + std::to_string(version));
+  }
+  return version;
 }
 
 /// After the last field.

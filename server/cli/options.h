@@ -35,7 +35,6 @@ struct ReconstructOptions {
   double sample_spacing_mm = surface::kSampleSpacing_mm, tolerance_mm = surface::kFitTolerance_mm;
   std::optional<double> smoothing_mm;
   double cell_mm = surface::kCell_mm;
-  std::size_t max_centres = surface::kMaxCentres;
 };
 
 struct ExportOptions {

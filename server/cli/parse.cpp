@@ -88,14 +88,11 @@ void addReconstruct(Program& program) {
   CLI::App* sub = add(program, "reconstruct", "Make the smooth surface, its mesh and the density", o, runReconstruct);
   sub->add_option("CASE", o->case_id, "Case id")->required();
   sub->add_option("--sample-spacing", o->sample_spacing_mm, "Between boundary points, mm")->capture_default_str();
-  sub->add_option("--tolerance", o->tolerance_mm, "Centres are added until samples are met this closely, mm")
+  sub->add_option("--tolerance", o->tolerance_mm, "Centres are left out while the surface moves by less than this, mm")
       ->capture_default_str();
   sub->add_option(
       "--smoothing", o->smoothing_mm,
-      "Averages the samples' noise, mm; 0 interpolates (default: 0.2 for voxels up to 0.5 mm, more for wider)");
-  sub->add_option("--max-centres", o->max_centres, "No more centres than this")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      "Averages the samples' noise, mm; 0 interpolates (default: as much as the noise found in them asks)");
   sub->add_option("--cell", o->cell_mm, "Size of the mesh's cells, mm")->capture_default_str();
   sub->add_option("--data", o->data, kDataHelp);
 }

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::uint32_t kLabelMagic = 0x314c5453;  // the bytes 'S' 'T' 'L' '1'
 constexpr std::uint32_t kModelMagic = 0x31465453;  // the bytes 'S' 'T' 'F' '1'
+constexpr std::uint32_t kModelVersion = 2;
 
 }  // namespace
 
@@ -73,8 +74,9 @@ Result<volume::LabelVolume> decodeLabel(std::span<const std::byte> bytes) {
 std::vector<std::byte> encodeModel(const rbf::Model& model) {
   wire::ByteWriter out;
   out.u32(kModelMagic);
-  out.u32(1);
+  out.u32(kModelVersion);
   out.vec3(model.centroid_patient);
+  out.f64(model.radius_mm);
   out.f64(model.constant);
   out.vec3(model.linear);
   out.u32(static_cast<std::uint32_t>(model.centres.size()));
@@ -87,9 +89,11 @@ std::vector<std::byte> encodeModel(const rbf::Model& model) {
 
 Result<rbf::Model> decodeModel(std::span<const std::byte> bytes) {
   wire::ByteReader in(bytes);
-  if (const auto read = wire::readPreamble(in, "model", kModelMagic); !read) return tl::unexpected(read.error());
+  const auto version = wire::readPreamble(in, "model", kModelMagic, kModelVersion);
+  if (!version) return tl::unexpected(version.error());
   rbf::Model model;
   model.centroid_patient = in.vec3();
+  if (*version >= 2) model.radius_mm = in.f64();
   model.constant = in.f64();
   model.linear = in.vec3();
   const std::uint32_t centres = in.u32();
@@ -106,7 +110,7 @@ Result<rbf::Model> decodeModel(std::span<const std::byte> bytes) {
 double lipschitzOf(const rbf::Model& model) {
   double sum = norm(model.linear);
   for (const double weight : model.weights) sum += std::abs(weight);
-  return sum * (1 + 1e-9);  // above the rounding of the sum
+  return std::max(1.0, sum * (1 + 1e-9));  // above the rounding of the sum, and the bound far away has slope 1
 }
 
 }  // namespace spinaltap::jobs

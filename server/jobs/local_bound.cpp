@@ -73,7 +73,7 @@ std::vector<Cube> firstCubes(const Cylinder& cylinder) {
 
 double lipschitzIn(const rbf::Model& model, const Cylinder& cylinder) {
   const double anywhere = lipschitzOf(model);
-  double steepest = 0;
+  double steepest = model.radius_mm > 0 ? 1 : 0;  // of the bound beyond the samples
   std::vector<Cube> cubes = firstCubes(cylinder);
   while (!cubes.empty()) {
     const Cube cube = cubes.back();

@@ -13,9 +13,6 @@
 namespace spinaltap::jobs {
 namespace {
 
-/// The dense solver's memory and time grow with the square and the cube.
-constexpr std::size_t kMostCentres = 12'000;
-
 struct Region {
   volume::CtVolume ct;
   volume::LabelVolume label;
@@ -66,9 +63,6 @@ std::function<void(double)> stage(const Progress& progress, const char* name) {
 }  // namespace
 
 Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, const Progress& progress) {
-  if (job.max_centres > kMostCentres) {
-    return fail(ErrorCode::Limit, "over " + std::to_string(kMostCentres) + " centres: the dense solver would not end");
-  }
   Stopwatch total, watch;
   const auto row = store.findCase(job.case_id);
   if (!row) return tl::unexpected(row.error());
@@ -84,12 +78,14 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
   const double boundary_s = watch.lap_s();
 
   const rbf::Samples samples{std::move(signed_samples->positions), std::move(signed_samples->distances_mm)};
-  const double smoothing_mm = job.smoothing_mm.value_or(surface::smoothingFor(region->ct.grid.spacing_mm));
-  const auto fit = rbf::fit(samples, {job.tolerance_mm, smoothing_mm, job.max_centres}, stage(progress, "fit"));
+  rbf::FitOptions options;
+  options.smoothing = job.smoothing_mm.value_or(rbf::kAutoSmoothing);
+  options.reduce_mm = job.tolerance_mm;
+  const auto fit = rbf::fit(samples, options, stage(progress, "fit"));
   if (!fit) return tl::unexpected(fit.error());
   const double fit_s = watch.lap_s();
 
-  const Field field = rbf::asField(fit->model, lipschitzOf(fit->model));
+  const Field field = rbf::asField(fit->model, lipschitzOf(fit->model), surface::kFieldTolerance_mm);
   const auto all_parts = mesh::polygonise(field, points->positions_patient,
                                           meshOptions(points->positions_patient, job.cell_mm), stage(progress, "mesh"));
   if (!all_parts) return tl::unexpected(all_parts.error());
@@ -103,9 +99,10 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
                   {"centres", fit->report.centres},
                   {"residual_max_mm", fit->report.residual_max_mm},
                   {"residual_rms_mm", fit->report.residual_rms_mm},
-                  {"reached_tolerance", fit->report.reached_tolerance},
+                  {"reduction_max_mm", fit->report.reduction_max_mm},
                   {"tolerance_mm", job.tolerance_mm},
-                  {"smoothing_mm", smoothing_mm},
+                  {"noise_mm", fit->report.noise_mm},
+                  {"smoothing_mm", fit->report.smoothing},
                   {"sum_abs_weights", fit->report.sum_abs_weights},
                   {"vertices", mesh.vertices.size()},
                   {"triangles", mesh.triangles.size()},

@@ -13,8 +13,7 @@ struct ReconstructJob {
   std::string case_id;
   double sample_spacing_mm = surface::kSampleSpacing_mm;
   double tolerance_mm = surface::kFitTolerance_mm;
-  std::optional<double> smoothing_mm;  ///< default: surface::smoothingFor the stack's voxels
-  std::size_t max_centres = surface::kMaxCentres;
+  std::optional<double> smoothing_mm;  ///< default: as the samples' noise asks
   double cell_mm = surface::kCell_mm;
 };
 
@@ -22,9 +21,9 @@ struct ReconstructJob {
 inline constexpr double kRoiMargin_mm = 15;
 
 /// Figures: case_id, boundary_points, boundary_points_from_ct, samples, centres, residual_max_mm, residual_rms_mm,
-/// reached_tolerance, tolerance_mm, smoothing_mm, sum_abs_weights, vertices, triangles, roi_dims, boundary_s, fit_s,
+/// reduction_max_mm, tolerance_mm, noise_mm, smoothing_mm, sum_abs_weights, vertices, triangles, roi_dims, boundary_s, fit_s,
 /// mesh_s, total_s.
-/// @error NotFound (no label yet), Limit (max_centres), and those of surface, rbf and mesh.
+/// @error NotFound (no label yet), and those of surface, rbf and mesh.
 [[nodiscard]] Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, const Progress& progress);
 
 }  // namespace spinaltap::jobs

@@ -38,7 +38,7 @@ Result<Reconstructed> meshOf(const phantom::Phantom& truth, const surface::Orien
   auto samples = surface::makeSamples(points);
   if (!samples) return tl::unexpected(samples.error());
   auto fit = rbf::fit({std::move(samples->positions), std::move(samples->distances_mm)},
-                      {surface::kFitTolerance_mm, surface::kSmoothing_mm, surface::kMaxCentres});
+                      {.smoothing = rbf::kAutoSmoothing, .reduce_mm = surface::kFitTolerance_mm});
   if (!fit) return tl::unexpected(fit.error());
   const Field field = rbf::asField(std::move(fit->model), std::numeric_limits<double>::infinity());
   Vec3 low = points.positions_patient.front(), high = low;

@@ -89,7 +89,7 @@ TEST_F(Figures, OfEveryCommandAreDocumentedFromPhantomToReplay) {
       << "voxels of a millimetre and more, and a threshold";
 
   const Json made =
-      json({"reconstruct", case_, "--max-centres", "300", "--sample-spacing", "2", "--cell", "1.5", "--data", data},
+      json({"reconstruct", case_, "--tolerance", "0.2", "--sample-spacing", "2", "--cell", "1.5", "--data", data},
            "reconstruct");
   EXPECT_LE(made["centres"], 300);
   EXPECT_GT(made["samples"], made["centres"]);

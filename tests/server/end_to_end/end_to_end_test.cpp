@@ -71,7 +71,7 @@ TEST_F(EndToEnd, AHoleBesideThePedicleIsABreach) {
   const Json phantom = json({"phantom", "--out", path("ct"), "--reduce", "2"}, false);
   const std::string id = json({"import", "--from", path("ct")})["case_id"];
   std::ignore = json({"segment", id, "--seed", joined(phantom["seed_point_patient"])});
-  std::ignore = json({"reconstruct", id, "--max-centres", "1000"});
+  std::ignore = json({"reconstruct", id, "--tolerance", "0.1"});
   const Json& pedicle = phantom["pedicles"]["left"];
   Json entry = pedicle["entry_patient"], target = pedicle["target_patient"];
   // towards the middle by half the pedicle's width: the bit's side comes out by about its radius

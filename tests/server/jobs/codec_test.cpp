@@ -14,6 +14,7 @@ rbf::Model exampleModel() {
   rbf::Model model;
   Random random(11);
   model.centroid_patient = {1e5 / 3, -2, 3};
+  model.radius_mm = 77.7;
   model.constant = std::numeric_limits<double>::denorm_min();
   model.linear = {0.1, 0.2, -0.3};
   for (int i = 0; i < 50; ++i) {
@@ -35,10 +36,28 @@ volume::LabelVolume exampleLabel(std::uint64_t seed) {
 TEST(ModelCodec, KeepsEveryBit) {
   const rbf::Model model = exampleModel(), back = decodeModel(encodeModel(model)).value();
   EXPECT_EQ(back.centroid_patient, model.centroid_patient);
+  EXPECT_EQ(back.radius_mm, model.radius_mm);
   EXPECT_EQ(back.constant, model.constant);
   EXPECT_EQ(back.linear, model.linear);
   EXPECT_EQ(back.centres, model.centres);
   EXPECT_EQ(back.weights, model.weights);
+}
+
+TEST(ModelCodec, StillReadsTheFirstVersionWhichHadNoRadius) {
+  const rbf::Model model = exampleModel();
+  std::vector<std::byte> bytes = encodeModel(model);
+  bytes[4] = std::byte{1};
+  bytes.erase(bytes.begin() + 32, bytes.begin() + 40);  // behind magic, version and centroid
+  const rbf::Model back = decodeModel(bytes).value();
+  EXPECT_EQ(back.radius_mm, 0);
+  EXPECT_EQ(back.constant, model.constant);
+  EXPECT_EQ(back.centres, model.centres);
+}
+
+TEST(ModelCodec, RefusesVersionsItDoesNotKnow) {
+  std::vector<std::byte> bytes = encodeModel(exampleModel());
+  bytes[4] = std::byte{3};
+  EXPECT_EQ(decodeModel(bytes).error().code, ErrorCode::Unsupported);
 }
 
 TEST(ModelCodec, RefusesEveryTruncation) {

@@ -25,7 +25,7 @@ rbf::Model sphere(std::uint64_t seed) {
       samples.distances_mm.push_back(distance_mm);
     }
   }
-  return rbf::fit(samples, {0.05, 0.05, 300}).value().model;
+  return rbf::fit(samples, {.smoothing = 0.05, .reduce_mm = 0.05}).value().model;
 }
 
 plan::Path pathInto(const Vec3& middle) {

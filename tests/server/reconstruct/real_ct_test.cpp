@@ -38,7 +38,7 @@ Result<Made> reconstruct(const volume::CtVolume& ct, const volume::LabelVolume& 
   auto samples = surface::makeSamples(*points);
   if (!samples) return tl::unexpected(samples.error());
   auto fit = rbf::fit({std::move(samples->positions), std::move(samples->distances_mm)},
-                      {surface::kFitTolerance_mm, surface::smoothingFor(ct.grid.spacing_mm), surface::kMaxCentres});
+                      {.smoothing = rbf::kAutoSmoothing, .reduce_mm = surface::kFitTolerance_mm});
   if (!fit) return tl::unexpected(fit.error());
   std::printf("  %zu points (%zu from the CT), %zu centres, residual %.2f mm RMS\n", points->normals.size(),
               points->from_ct, fit->report.centres, fit->report.residual_rms_mm);

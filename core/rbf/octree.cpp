@@ -1,0 +1,120 @@
+#include "core/rbf/octree.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/parallel.h"
+
+namespace spinaltap::rbf {
+namespace {
+
+constexpr std::size_t kBlock = 50'000;  // points that one thread takes at a time
+constexpr std::uint64_t kCells = std::uint64_t{1} << Octree::kDeepest;
+
+/// Spreads 20 bits so that two zeros follow each.
+std::uint64_t spread(std::uint64_t v) {
+  v = (v | v << 32) & 0x1f00000000ffffULL;
+  v = (v | v << 16) & 0x1f0000ff0000ffULL;
+  v = (v | v << 8) & 0x100f00f00f00f00fULL;
+  v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
+  return (v | v << 2) & 0x1249249249249249ULL;
+}
+
+std::uint64_t cellOf(double relative, double half) {
+  const double share = (relative / half + 1.0) * 0.5 * static_cast<double>(kCells);
+  return share <= 0 ? 0 : std::min(kCells - 1, static_cast<std::uint64_t>(share));
+}
+
+struct Keyed {
+  std::uint64_t key;
+  std::uint32_t index;
+};
+
+/// Stable, 11 bits a pass, over the highest `bits` of 60.
+void sortByHighBits(std::vector<Keyed>& items, int bits) {
+  constexpr int kDigit = 11;
+  std::vector<Keyed> other(items.size());
+  for (int shift = 3 * Octree::kDeepest - bits; shift < 3 * Octree::kDeepest; shift += kDigit) {
+    std::array<std::uint32_t, (1U << kDigit) + 1> starts{};
+    for (const Keyed& i : items) ++starts[(i.key >> shift & ((1U << kDigit) - 1)) + 1];
+    for (std::size_t n = 1; n < starts.size(); ++n) starts[n] += starts[n - 1];
+    for (const Keyed& i : items) other[starts[i.key >> shift & ((1U << kDigit) - 1)]++] = i;
+    items.swap(other);
+  }
+}
+
+}  // namespace
+
+RootCube RootCube::around(std::span<const Vec3> a, std::span<const Vec3> b) {
+  Vec3 low = a.empty() ? b.front() : a.front(), high = low;
+  for (const std::span<const Vec3> set : {a, b}) {
+    for (const Vec3& p : set) {
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+  }
+  const Vec3 size = high - low;
+  const double longest = std::max({size.x, size.y, size.z});
+  // One point, or points that rounding cannot tell apart, still get a cube.
+  const double floor = 1e-12 * (1.0 + std::max({std::abs(low.x), std::abs(low.y), std::abs(low.z)}));
+  return {low + size * 0.5, std::max(0.5 * longest * (1 + 1e-9), floor)};
+}
+
+bool RootCube::holds(const Vec3& p) const {
+  return std::abs(p.x - middle.x) <= half && std::abs(p.y - middle.y) <= half && std::abs(p.z - middle.z) <= half;
+}
+
+Octree::Octree(std::span<const Vec3> points, const RootCube& root, std::size_t leaf_size, int deepest) : root_(root) {
+  std::vector<Keyed> items(points.size());
+  const unsigned threads = points.size() > kBlock ? 0 : 1;
+  parallelBlocks(points.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3 p = points[i] - root.middle;
+      const std::uint64_t x = cellOf(p.x, root.half), y = cellOf(p.y, root.half), z = cellOf(p.z, root.half);
+      items[i] = {spread(x) | spread(y) << 1 | spread(z) << 2, static_cast<std::uint32_t>(i)};
+    }
+  });
+  sortByHighBits(items, 3 * std::min(deepest, kDeepest));
+  std::vector<std::uint64_t> keys(items.size());
+  order_.resize(items.size()), x_.resize(items.size()), y_.resize(items.size()), z_.resize(items.size());
+  parallelBlocks(items.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      keys[n] = items[n].key, order_[n] = items[n].index;
+      const Vec3 p = points[items[n].index] - root.middle;
+      x_[n] = p.x, y_[n] = p.y, z_[n] = p.z;
+    }
+  });
+  nodes_.push_back({0, {0, 0, 0}, 0, static_cast<std::uint32_t>(items.size()), -1, 0});
+  for (std::size_t n = 0; n < nodes_.size(); ++n) split(n, keys, leaf_size, std::min(deepest, kDeepest));
+}
+
+void Octree::split(std::size_t n, const std::vector<std::uint64_t>& keys, std::size_t leaf_size, int deepest) {
+  const OctreeNode node = nodes_[n];
+  if (node.count <= leaf_size || node.level >= deepest) return;
+  const int shift = 3 * (kDeepest - node.level - 1);
+  const auto begin = keys.begin() + node.first, end = begin + node.count;
+  nodes_[n].children = static_cast<std::int32_t>(nodes_.size());
+  auto from = begin;
+  for (std::uint64_t octant = 0; octant < 8; ++octant) {
+    const auto to = std::partition_point(from, end, [&](std::uint64_t key) { return (key >> shift & 7) <= octant; });
+    if (to == from) continue;
+    const auto bit = [&](int axis) { return static_cast<std::int32_t>(octant >> axis & 1); };
+    nodes_.push_back({node.level + 1,
+                      {2 * node.at[0] + bit(0), 2 * node.at[1] + bit(1), 2 * node.at[2] + bit(2)},
+                      static_cast<std::uint32_t>(from - keys.begin()),
+                      static_cast<std::uint32_t>(to - from),
+                      -1,
+                      0});
+    ++nodes_[n].child_count;
+    from = to;
+  }
+  depth_ = std::max(depth_, node.level + 1);
+}
+
+Vec3 Octree::middleOf(const OctreeNode& node) const {
+  const double half = halfOf(node.level);
+  const auto along = [&](std::size_t axis) { return (2 * static_cast<double>(node.at[axis]) + 1) * half - root_.half; };
+  return {along(0), along(1), along(2)};
+}
+
+}  // namespace spinaltap::rbf

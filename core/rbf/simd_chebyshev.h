@@ -1,0 +1,24 @@
+// core/rbf/simd_chebyshev.h - the loops over points of chebyshev.h (internal).
+#pragma once
+#include <cstddef>
+
+#include "core/rbf/simd_sums.h"
+
+namespace spinaltap::rbf {
+
+/// A cube and its interpolation: rows of p values are padded to `stride`, a multiple of 8.
+struct CubeBasis {
+  int nodes;
+  std::size_t stride;
+  const double* basis;  ///< p x stride, as Chebyshev::basis_
+  double middle[3];
+  double half;
+};
+
+/// values: p x p rows of stride.
+void gatherWeights(const CubeBasis& cube, const PointArrays<double>& points, const double* weights, double* values);
+void spreadValues(const CubeBasis& cube, const double* values, const PointArrays<double>& points, double* out);
+void spreadGradients(const CubeBasis& cube, const double* values, const PointArrays<double>& points, double* out_x,
+                     double* out_y, double* out_z);
+
+}  // namespace spinaltap::rbf
