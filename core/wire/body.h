@@ -14,7 +14,7 @@ namespace spinaltap::wire {
 
 /// Reads magic and version 1.
 [[nodiscard]] inline Result<std::uint32_t> readPreamble(ByteReader& in, const char* what, std::uint32_t magic,
-                                                       std::uint32_t newest = 1) {
+                                                        std::uint32_t newest = 1) {
   const std::uint32_t found = in.u32(), version = in.u32();
   if (in.failed()) return corrupt(what, in.offset(), "ends within its first eight bytes");
   if (found != magic) return corrupt(what, 0, "wrong magic number");

@@ -19,6 +19,7 @@ struct Outcome {
 [[nodiscard]] Result<Outcome> runSegment(const SegmentOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runReconstruct(const ReconstructOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runExport(const ExportOptions& options, ProgressBar& bar);
+[[nodiscard]] Result<Outcome> runFit(const FitOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runPlan(const PlanOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runDrill(const DrillOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runReplay(const ReplayOptions& options, ProgressBar& bar);

@@ -42,6 +42,14 @@ struct ExportOptions {
   std::optional<double> simplify_mm;
 };
 
+struct FitOptions {
+  std::string file, points, values, smoothing = "0";
+  double tolerance_mm = 0.01, reduce_mm = 0, evaluate_tolerance_mm = 0;
+  std::optional<double> offset_mm;
+  unsigned threads = 0;
+  bool gradients = false;
+};
+
 struct PlanOptions {
   std::string data, case_id, label, entry, target;
   plan::Bit bit;

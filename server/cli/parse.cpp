@@ -90,9 +90,8 @@ void addReconstruct(Program& program) {
   sub->add_option("--sample-spacing", o->sample_spacing_mm, "Between boundary points, mm")->capture_default_str();
   sub->add_option("--tolerance", o->tolerance_mm, "Centres are left out while the surface moves by less than this, mm")
       ->capture_default_str();
-  sub->add_option(
-      "--smoothing", o->smoothing_mm,
-      "Averages the samples' noise, mm; 0 interpolates (default: as much as the noise found in them asks)");
+  sub->add_option("--smoothing", o->smoothing_mm,
+                  "Averages the samples' noise, mm; 0 interpolates (default: as much as the noise found in them asks)");
   sub->add_option("--cell", o->cell_mm, "Size of the mesh's cells, mm")->capture_default_str();
   sub->add_option("--data", o->data, kDataHelp);
 }
@@ -108,6 +107,33 @@ void addExport(Program& program) {
   sub->add_option("--simplify", o->simplify_mm, "Fewer triangles, nowhere farther than this from the surface, mm")
       ->check(CLI::Range(1e-3, 10.0));
   sub->add_option("--data", o->data, kDataHelp);
+}
+
+void addFit(Program& program) {
+  auto o = std::make_shared<FitOptions>();
+  CLI::App* sub =
+      add(program, "fit", "Fit the implicit surface to any points, and evaluate it: the stage alone", o, runFit);
+  sub->add_option("FILE", o->file, "Lines of x y z value (signed distance), or of x y z nx ny nz; any one unit")
+      ->required();
+  sub->add_option("--tolerance", o->tolerance_mm, "Every sample is met this closely, mm")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  sub->add_option("--smoothing", o->smoothing, "auto: by the noise found in the samples; 0: none; else a ridge, mm")
+      ->capture_default_str();
+  sub->add_option("--reduce", o->reduce_mm,
+                  "Leave out centres while the surface moves by less than this, mm; 0 keeps all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  sub->add_option("--offset", o->offset_mm,
+                  "With normals: off-surface samples this far along them (default: the points' spacing)")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--evaluate", o->points, "Lines of x y z where the surface is to be evaluated");
+  sub->add_option("--out", o->values, "Its values, a line a point (default: the points' file with .values added)");
+  sub->add_flag("--gradients", o->gradients, "Write lines of value gx gy gz");
+  sub->add_option("--evaluate-tolerance", o->evaluate_tolerance_mm,
+                  "Of the values, mm (default: a hundredth of --tolerance)")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--threads", o->threads, "At most so many; 0: all")->capture_default_str();
 }
 
 void addPlan(Program& program) {
@@ -220,6 +246,7 @@ int run(int argc, char** argv) {
   addSegment(program);
   addReconstruct(program);
   addExport(program);
+  addFit(program);
   addPlan(program);
   addDrill(program);
   addRest(program);

@@ -18,8 +18,8 @@ namespace spinaltap::jobs {
 [[nodiscard]] std::vector<std::byte> encodeLabel(const volume::LabelVolume& label);
 [[nodiscard]] Result<volume::LabelVolume> decodeLabel(std::span<const std::byte> bytes);
 
-/// 'STF1': u32 magic, u32 version = 2, f64 x 3 centroid, f64 radius, f64 constant, f64 x 3 linear, u32 centres, then for
-/// each f64 x 3 centre and f64 weight. The doubles keep their bits. Version 1 had no radius: it is read with none.
+/// 'STF1': u32 magic, u32 version = 2, f64 x 3 centroid, f64 radius, f64 constant, f64 x 3 linear, u32 centres, then
+/// for each f64 x 3 centre and f64 weight. The doubles keep their bits. Version 1 had no radius: it is read with none.
 [[nodiscard]] std::vector<std::byte> encodeModel(const rbf::Model& model);
 [[nodiscard]] Result<rbf::Model> decodeModel(std::span<const std::byte> bytes);
 

@@ -21,8 +21,8 @@ struct ReconstructJob {
 inline constexpr double kRoiMargin_mm = 15;
 
 /// Figures: case_id, boundary_points, boundary_points_from_ct, samples, centres, residual_max_mm, residual_rms_mm,
-/// reduction_max_mm, tolerance_mm, noise_mm, smoothing_mm, sum_abs_weights, vertices, triangles, roi_dims, boundary_s, fit_s,
-/// mesh_s, total_s.
+/// reduction_max_mm, tolerance_mm, noise_mm, smoothing_mm, sum_abs_weights, vertices, triangles, roi_dims, boundary_s,
+/// fit_s, mesh_s, total_s.
 /// @error NotFound (no label yet), and those of surface, rbf and mesh.
 [[nodiscard]] Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, const Progress& progress);
 

@@ -6,30 +6,12 @@
 #include <optional>
 #include <string>
 
+#include "server/jobs/words.h"
+
 namespace spinaltap::jobs {
 namespace {
 
 constexpr std::size_t kMostPoses = 20'000'000;
-constexpr std::string_view kSeparators = " \t\r,;";
-
-/// The next word, cut off the front of `line`; empty at the end.
-std::string_view nextWord(std::string_view& line) {
-  const std::size_t begin = line.find_first_not_of(kSeparators);
-  if (begin == std::string_view::npos) return {};
-  line.remove_prefix(begin);
-  const std::string_view word = line.substr(0, line.find_first_of(kSeparators));
-  line.remove_prefix(word.size());
-  return word;
-}
-
-std::optional<double> numberIn(std::string_view word) {
-  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (end != word.data() + word.size() || (error != std::errc() && error != std::errc::result_out_of_range)) return {};
-  return error == std::errc() ? std::optional(value) : std::nullopt;
-}
-
 /// Times may be written as 1000 or 1000.0 or 1e3, but not as 0.5.
 std::optional<std::uint64_t> timeIn(std::string_view word) {
   std::uint64_t whole = 0;
@@ -67,36 +49,18 @@ Result<session::Input> parseLine(std::string_view line) {
   return input;
 }
 
-bool isHeader(std::string_view line) {
-  const std::size_t at = line.find_first_not_of(" \t\r\"");
-  return at != std::string_view::npos &&
-         std::string_view("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_").find(line[at]) !=
-             std::string_view::npos;
-}
-
 }  // namespace
 
 Result<std::vector<session::Input>> parseTrace(std::string_view text, std::string_view name) {
-  if (text.substr(0, 3) == "\xef\xbb\xbf") text.remove_prefix(3);  // a byte order mark, as spreadsheets write it
   std::vector<session::Input> inputs;
-  bool first = true;
-  for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::size_t end = text.find('\n');
-    const std::string_view line = text.substr(0, end);
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    const std::size_t begin = line.find_first_not_of(kSeparators);
-    if (begin == std::string_view::npos || line[begin] == '#') continue;
-    const bool header = first && isHeader(line);
-    first = false;
-    if (header) continue;
+  const auto read = eachLine(text, name, [&](std::string_view line) -> Result<void> {
     auto input = parseLine(line);
-    if (!input) {
-      return fail(input.error().code,
-                  std::string(name) + " line " + std::to_string(number) + ": " + input.error().message);
-    }
-    if (inputs.size() == kMostPoses) return fail(ErrorCode::Limit, std::string(name) + ": over 20 million poses");
+    if (!input) return tl::unexpected(input.error());
+    if (inputs.size() == kMostPoses) return fail(ErrorCode::Limit, "over 20 million poses");
     inputs.push_back(*input);
-  }
+    return {};
+  });
+  if (!read) return tl::unexpected(read.error());
   if (inputs.empty()) return fail(ErrorCode::Corrupt, std::string(name) + ": no poses");
   return inputs;
 }

@@ -1,7 +1,7 @@
 // The polygoniser beside marching cubes on a dense grid, in one process: on the phantom's own field, whose surface is
 // known, and on an RBF fitted to it. Then what simplification leaves. Times differ between machines; ratios less so.
 //
-//   bench_mesh [--cell-um N] [--repeats N] [--centres N]
+//   bench_mesh [--cell-um N] [--repeats N]
 //
 // `own` is the time spent outside the field. The error is that of random points of the triangles, to the field's own
 // zero set (by a Newton step, for the RBF).
@@ -28,7 +28,7 @@ using Clock = std::chrono::steady_clock;
 double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 struct Options {
-  int cell_um = 500, repeats = 5, centres = 600;
+  int cell_um = 500, repeats = 5;
 };
 
 struct Counts {
@@ -134,7 +134,7 @@ std::vector<Vec3> seedsOn(const mesh::TriangleMesh& fine) {
   return seeds;
 }
 
-Field fittedField(const mesh::TriangleMesh& surface, int centres) {
+Field fittedField(const mesh::TriangleMesh& surface) {
   rbf::Samples samples;
   for (std::size_t v = 0; v < surface.vertices.size(); v += 4) {
     for (const double off_mm : {-1.0, 0.0, 1.0}) {
@@ -142,15 +142,12 @@ Field fittedField(const mesh::TriangleMesh& surface, int centres) {
       samples.distances_mm.push_back(off_mm);
     }
   }
-  rbf::FitOptions options;
-  options.tolerance_mm = 0.05;
-  options.max_centres = static_cast<std::size_t>(centres);
-  const auto fit = rbf::fit(samples, options);
+  const auto fit = rbf::fit(samples, {.reduce_mm = 0.05});
   if (!fit) {
     std::fprintf(stderr, "bench_mesh: %s\n", fit.error().message.c_str());
     std::exit(1);
   }
-  return rbf::asField(fit->model, std::numeric_limits<double>::infinity());
+  return rbf::asField(fit->model, std::numeric_limits<double>::infinity(), 1e-3);
 }
 
 void simplifyTable(const mesh::TriangleMesh& mesh) {
@@ -173,8 +170,6 @@ bool parse(int argc, char** argv, Options& options) {
       options.cell_um = value;
     } else if (key == "--repeats") {
       options.repeats = value;
-    } else if (key == "--centres") {
-      options.centres = value;
     } else {
       return false;
     }
@@ -192,7 +187,7 @@ void bench(const Options& options) {
   const std::vector<Vec3> seeds = seedsOn(coarse);
   box.cell_mm = options.cell_um / 1000.0;
   const auto bone = compare("the phantom's field", exact, seeds, box, options.repeats);
-  compare("an RBF", fittedField(coarse, options.centres), seeds, box, options.repeats);
+  compare("an RBF", fittedField(coarse), seeds, box, options.repeats);
   simplifyTable(bone);
 }
 
@@ -202,7 +197,7 @@ void bench(const Options& options) {
 int main(int argc, char** argv) {
   spinaltap::Options options;
   if (!spinaltap::parse(argc, argv, options)) {
-    std::fprintf(stderr, "usage: bench_mesh [--cell-um N] [--repeats N] [--centres N]\n");
+    std::fprintf(stderr, "usage: bench_mesh [--cell-um N] [--repeats N]\n");
     return 2;
   }
   spinaltap::bench(options);

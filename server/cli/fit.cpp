@@ -1,0 +1,38 @@
+
+#include <charconv>
+
+#include "server/cli/commands.h"
+#include "server/jobs/fit_job.h"
+
+namespace spinaltap::cli {
+namespace {
+
+Result<double> smoothingOf(const std::string& text) {
+  if (text == "auto") return rbf::kAutoSmoothing;
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0)) {
+    return fail(ErrorCode::InvalidArgument,
+                "--smoothing needs auto or a number from 0, not '" + text.substr(0, 40) + "'");
+  }
+  return value;
+}
+
+}  // namespace
+
+Result<Outcome> runFit(const FitOptions& options, ProgressBar& bar) {
+  const auto smoothing = smoothingOf(options.smoothing);
+  if (!smoothing) return tl::unexpected(smoothing.error());
+  jobs::FitJob job;
+  job.samples = options.file;
+  job.options = {options.tolerance_mm, *smoothing, options.reduce_mm, options.threads};
+  job.offset_mm = options.offset_mm;
+  job.points = options.points, job.values = options.values;
+  job.gradients = options.gradients;
+  job.evaluate_tolerance_mm = options.evaluate_tolerance_mm;
+  auto figures = jobs::fitPoints(job, bar.callback());
+  if (!figures) return tl::unexpected(figures.error());
+  return Outcome{std::move(*figures)};
+}
+
+}  // namespace spinaltap::cli
