@@ -125,12 +125,14 @@ Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads) : model
   assert(tolerance_mm > 0);
   const std::size_t n = model_.centres.size();
   if (n * kTried < 64'000) return;
-  // Beside centres, where near pairs weigh most: a quarter of the tolerance there leaves room for places not tried.
+  // Half beside centres, where near pairs weigh most, half all over the ball, where the largest cubes' errors show;
+  // half of the tolerance there leaves room for places not tried.
   Random random(n);
   std::vector<Vec3> places;
   for (std::size_t k = 0; k < kTried; ++k) {
     const Vec3 away{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
-    places.push_back(model_.centres[k * n / kTried] + away * (0.02 * model_.radius_mm));
+    places.push_back(k % 2 == 0 ? model_.centres[k * n / kTried] + away * (0.02 * model_.radius_mm)
+                                : away * model_.radius_mm);
   }
   const Coordinates at(places), centres(model_.centres);
   std::vector<double> direct(kTried), fast(kTried);
@@ -143,19 +145,19 @@ Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads) : model
     for (std::size_t k = 0; k < kTried; ++k) most = std::max(most, std::abs(fast[k] - direct[k]));
     return most;
   };
-  const double wanted = 0.25 * tolerance_mm;
-  bool single = true;
-  double before = std::numeric_limits<double>::infinity();
-  for (int nodes = 4; nodes <= Chebyshev::kMost; ++nodes) {
-    double most = error(nodes, single);
-    // Another node an axis gains a factor of four and more; if not, it is single precision that is wrong.
-    if (most > wanted && single && most > 0.5 * before) single = false, most = error(nodes, single);
-    if (most <= wanted) {
-      nodes_ = nodes, single_near_ = single;
+  const double wanted = tolerance_mm / 3;
+  for (int nodes = 6; nodes <= Chebyshev::kMost;) {
+    const double most = error(nodes, true);
+    if (most <= wanted || (most <= 4 * wanted && error(nodes, false) <= wanted)) {
+      nodes_ = nodes, single_near_ = most <= wanted;
       return;
     }
-    before = most;
+    // Each node an axis gains a factor of about six. What single precision cannot reach, the last order tries in
+    // double.
+    const int more = std::max(1, static_cast<int>(std::log(most / wanted) / std::log(6.0)));
+    nodes = nodes < Chebyshev::kMost ? std::min(nodes + more, Chebyshev::kMost) : nodes + 1;
   }
+  if (error(Chebyshev::kMost, false) <= wanted) nodes_ = Chebyshev::kMost;
 }
 
 void Evaluator::values(std::span<const Vec3> points, std::span<double> out) const {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kKinds = 16;
 // Target nodes that one thread takes at a time.
-constexpr std::size_t kGroup = 48;
+constexpr std::size_t kGroup = 192;
 constexpr std::size_t kColumns = 64;  // far pairs multiplied at a time
 
 /// Distances between cubes, sorted downwards, are (2, 0, 0) .. (3, 3, 3).

@@ -83,7 +83,8 @@ void evaluateGradient(const Model& model, std::span<const Vec3> points_patient, 
 class Evaluator {
  public:
   /// Values within `tolerance_mm` of the oracle's: the order of the sums is chosen by comparing with it at some hundred
-  /// places near the centres, to a quarter of the tolerance. Below what fast sums can give, everything is direct.
+  /// places near and between the centres, to a third of the tolerance. Below what fast sums can give, everything is
+  /// direct.
   /// @param model copied. @pre tolerance_mm > 0.
   Evaluator(Model model, double tolerance_mm, unsigned threads = 0);
 

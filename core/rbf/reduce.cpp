@@ -10,11 +10,12 @@
 namespace spinaltap::rbf {
 namespace {
 
-constexpr double kFirstShare = 30;  // one point in so many to begin with
+constexpr double kFirstShare = 12;  // one point in so many to begin with
 // Each round adds at most this share of the centres so far: more would crowd around one bad spot, less costs rounds.
-constexpr double kGrowth = 0.5;
-// Centres are solved for more closely than the reduction asks, so that what is missed is missed for want of centres.
-constexpr double kSolveShare = 0.1;
+constexpr double kGrowth = 0.6;
+// Centres are solved for more closely than the reduction asks, so that what is missed is missed for want of centres; as
+// long as much is missed, that need not be so close.
+constexpr double kSolveShare = 0.1, kFirstSolveShare = 0.5;
 
 /// Refuses points closer than a radius to one already taken (cells as wide as the radius, 27 looked at).
 class Spacing {
@@ -47,12 +48,18 @@ class Spacing {
   std::unordered_map<std::int64_t, std::vector<Vec3>> cells_;
 };
 
+double largestOf(std::span<const double> values) {
+  double most = 0;
+  for (const double v : values) most = std::max(most, std::abs(v));
+  return most;
+}
+
 /// The reduced fit minus the values.
 std::vector<double> missed(std::span<const Vec3> points, std::span<const double> values,
                            const std::vector<Vec3>& centres, const SystemSolution& s, double tolerance,
                            unsigned threads) {
   FastSumOptions options;
-  options.threads = threads, options.leaf_size = 120;
+  options.threads = threads, options.leaf_size = 120, options.single_near = tolerance > 1e-2 * largestOf(values);
   // Six nodes are wrong by about 1e-5 of what the far centres weigh; a seventh where that is too much.
   options.nodes = tolerance < 1e-4 ? 7 : 6;
   const FastSum sum(centres, points, options);
@@ -97,19 +104,21 @@ Result<Reduced> reduce(std::span<const Vec3> points, std::span<const double> val
   out.centres = thinOut(points, cutIntoSubdomains(points, 200, 200), kFirstShare);
   std::vector<std::uint8_t> taken(points.size(), 0);
   for (const std::uint32_t i : out.centres) taken[i] = 1;
-  double first = 0;
+  double first = 0, share = kFirstSolveShare;
   while (true) {
     std::vector<Vec3> centres;
     std::vector<double> wanted;
     for (const std::uint32_t i : out.centres) centres.push_back(points[i]), wanted.push_back(values[i]);
     const auto system = System::make(centres, 0, threads);
     if (!system) return tl::unexpected(system.error());
-    out.solution = system->solve(wanted, kSolveShare * tolerance);
+    out.solution = system->solve(wanted, share * tolerance);
     const std::vector<double> errors = missed(points, values, centres, out.solution, tolerance, threads);
     out.largest = 0;
     for (const double e : errors) out.largest = std::max(out.largest, std::abs(e));
     first = std::max(first, out.largest);
-    if (out.largest <= tolerance) return out;
+    if (out.largest <= tolerance && share == kSolveShare) return out;
+    if (out.largest <= 2 * tolerance) share = kSolveShare;
+    if (out.largest <= tolerance) continue;
     if (progress) progress(std::clamp(std::log(first / out.largest) / std::log(first / tolerance), 0.0, 1.0));
     const std::vector<std::uint32_t> more = worst(points, errors, taken, tolerance, out.centres.size());
     if (more.empty()) {
