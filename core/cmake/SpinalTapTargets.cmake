@@ -30,8 +30,11 @@ endif()
 
 # Highway: every inner loop once for each of a few vector widths, chosen at run time; in the browser the one it has.
 add_library(spinaltap_simd INTERFACE)
-target_compile_definitions(spinaltap_simd INTERFACE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_AVX3_DL)")
-if(NOT EMSCRIPTEN)
+if(EMSCRIPTEN)
+  # Highway 1.0's WebAssembly vectors have no doubles; its portable ones do, and the compiler makes simd128 of them.
+  target_compile_definitions(spinaltap_simd INTERFACE HWY_COMPILE_ONLY_EMU128)
+else()
+  target_compile_definitions(spinaltap_simd INTERFACE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_AVX3_DL)")
   find_library(HIGHWAY hwy REQUIRED)
   target_link_libraries(spinaltap_simd INTERFACE ${HIGHWAY})
 endif()

@@ -19,7 +19,7 @@ constexpr double kFarRadii = 4;                    // farther points are summed 
 constexpr std::size_t kTried = 256;                // places at which an order is tried out
 
 unsigned usefulThreads(const Model& model, std::size_t points, unsigned threads) {
-  return points * (model.centres.size() + 1) < kWorthAThread ? 1 : threads;
+  return std::uint64_t{points} * (model.centres.size() + 1) < kWorthAThread ? 1 : threads;
 }
 
 /// The polynomial, and the bound beyond the ball.
@@ -125,8 +125,8 @@ Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads) : model
   assert(tolerance_mm > 0);
   const std::size_t n = model_.centres.size();
   if (n * kTried < 64'000) return;
-  // Half beside centres, where near pairs weigh most, half all over the ball, where the largest cubes' errors show;
-  // half of the tolerance there leaves room for places not tried.
+  // Half beside centres, where near pairs weigh most, half all over the ball, where the largest cubes' errors show; a
+  // third of the tolerance there leaves room for places not tried.
   Random random(n);
   std::vector<Vec3> places;
   for (std::size_t k = 0; k < kTried; ++k) {
@@ -161,7 +161,7 @@ Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads) : model
 }
 
 void Evaluator::values(std::span<const Vec3> points, std::span<double> out) const {
-  if (nodes_ == 0 || points.size() * model_.centres.size() < kWorthFastSums)
+  if (nodes_ == 0 || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
     return evaluate(model_, points, out, threads_);
   const std::vector<std::size_t> near = nearPoints(model_, points);
   if (!near.empty()) {
@@ -178,7 +178,7 @@ void Evaluator::values(std::span<const Vec3> points, std::span<double> out) cons
 }
 
 void Evaluator::gradients(std::span<const Vec3> points, std::span<Vec3> out) const {
-  if (nodes_ == 0 || points.size() * model_.centres.size() < kWorthFastSums)
+  if (nodes_ == 0 || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
     return evaluateGradient(model_, points, out, threads_);
   const std::vector<std::size_t> near = nearPoints(model_, points);
   if (!near.empty()) {

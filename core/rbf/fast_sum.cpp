@@ -10,7 +10,6 @@
 namespace spinaltap::rbf {
 namespace {
 
-constexpr int kKinds = 16;
 // Target nodes that one thread takes at a time.
 constexpr std::size_t kGroup = 192;
 constexpr std::size_t kColumns = 64;  // far pairs multiplied at a time

@@ -58,10 +58,12 @@ Model modelOf(const PreparedSamples& s, const std::vector<Vec3>& centres, const 
 /// the centres, and every distance serves twice.
 void measureResiduals(const Samples& samples, const Model& model, unsigned threads, FitReport& report) {
   const std::size_t all = samples.positions.size();
-  const bool own_centres = model.centres.size() == all && all * all <= kDirectPairs;
-  const std::size_t affordable = std::max<std::size_t>(1000, kDirectPairs / model.centres.size());
-  report.residual_samples = std::min(all, affordable);
-  const auto chosen = [&](std::size_t n) { return n * all / report.residual_samples; };
+  const bool own_centres = model.centres.size() == all && std::uint64_t{all} * all <= kDirectPairs;
+  const std::uint64_t affordable = std::max<std::uint64_t>(1000, kDirectPairs / model.centres.size());
+  report.residual_samples = static_cast<std::size_t>(std::min<std::uint64_t>(all, affordable));
+  const auto chosen = [&](std::size_t n) {
+    return static_cast<std::size_t>(std::uint64_t{n} * all / report.residual_samples);
+  };
   std::vector<double> values(report.residual_samples);
   if (own_centres) {
     values = distancesAmong(Coordinates(model.centres), model.weights, threads);

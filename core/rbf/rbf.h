@@ -2,6 +2,7 @@
 // After: Carr et al., "Reconstruction and Representation of 3D Objects with Radial Basis Functions", SIGGRAPH 2001.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
@@ -54,7 +55,7 @@ struct FitReport {
 };
 
 /// Direct residuals of a fit take at most so many pairs (some seconds); of larger fits, an even choice of samples.
-inline constexpr std::size_t kDirectPairs = 20'000'000'000;
+inline constexpr std::uint64_t kDirectPairs = 20'000'000'000;
 
 struct Fit {
   Model model;

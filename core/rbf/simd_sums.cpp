@@ -1,6 +1,7 @@
 #include "core/rbf/simd_sums.h"
 
 #include <algorithm>
+#include <cstdint>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/rbf/simd_sums.cpp"
@@ -90,7 +91,7 @@ struct Chunk {
 
 // Sums in single precision are handed over to double after so few sources: longer ones lose digits to their own size.
 template <class T>
-constexpr std::size_t kRun = sizeof(T) == 4 ? 8 : std::size_t{1} << 40;
+constexpr std::size_t kRun = sizeof(T) == 4 ? 8 : SIZE_MAX / 2;
 
 /// What runs add up to, in double.
 template <class T>
