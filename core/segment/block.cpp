@@ -53,8 +53,8 @@ Part emptyPart(const Grid& grid, const Vec3& seed, const Vec3& low, const Vec3& 
 }
 
 void averageInto(Part& part, const CtVolume& ct, unsigned threads) {
-  const auto [nx, ny, nz] = part.dims;
-  const auto [fx, fy, fz] = part.factor;
+  const int nx = part.dims[0], ny = part.dims[1], nz = part.dims[2];
+  const int fx = part.factor[0], fy = part.factor[1], fz = part.factor[2];
   part.hu.resize(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz));
   const float scale = 1.0F / static_cast<float>(fx * fy * fz);
   parallelBlocks(static_cast<std::size_t>(nz), 1, threads, [&](std::size_t from, std::size_t to) {

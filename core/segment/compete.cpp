@@ -30,7 +30,7 @@ std::vector<Step> stepsOf(const std::array<int, 3>& dims) {
 }  // namespace
 
 Flooded compete(const Flood& flood, std::uint32_t most) {
-  const auto [nx, ny, nz] = flood.dims;
+  const int nx = flood.dims[0], ny = flood.dims[1], nz = flood.dims[2];
   const std::vector<Step> steps = stepsOf(flood.dims);
   Flooded out{flood.owner, std::vector<std::uint32_t>(flood.owner.size(), UINT32_MAX)};
   std::vector<std::vector<std::uint32_t>> buckets(most + 1);

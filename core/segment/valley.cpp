@@ -44,7 +44,7 @@ double largestEigenvalue(const Hessian& h) {
 std::vector<float> valleyDepth(const Block& block, const std::vector<float>& values, double least_hu,
                                unsigned threads) {
   std::vector<float> out(values.size(), 0);
-  const auto [nx, ny, nz] = block.dims;
+  const int nx = block.dims[0], ny = block.dims[1], nz = block.dims[2];
   const std::ptrdiff_t sy = nx, sz = sy * ny;
   parallelBlocks(static_cast<std::size_t>(nz), 4, threads, [&](std::size_t from, std::size_t to) {
     for (int k = std::max(1, static_cast<int>(from)); k < std::min(nz - 1, static_cast<int>(to)); ++k) {
