@@ -91,7 +91,6 @@ TEST_F(Figures, OfEveryCommandAreDocumentedFromPhantomToReplay) {
   const Json made =
       json({"reconstruct", case_, "--tolerance", "0.2", "--sample-spacing", "2", "--cell", "1.5", "--data", data},
            "reconstruct");
-  EXPECT_LE(made["centres"], 300);
   EXPECT_GT(made["samples"], made["centres"]);
   EXPECT_LT(made["residual_rms_mm"], made["residual_max_mm"]);
 

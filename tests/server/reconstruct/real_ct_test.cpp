@@ -102,7 +102,7 @@ TEST(RealCt, ALabelledLumbarVertebraBecomesAClosedSurface) {
   expectClosedBone(*made);
   expectPathInBone(made->field, {-41.7, 200.1, -129.0}, {-37.4, 172.0, -122.2});  // the patient's right
   expectPathInBone(made->field, {-5.9, 198.2, -132.5}, {-13.2, 172.0, -123.5});   // left
-  EXPECT_GT(at(made->field, {-22, 195, -124}), 3) << "the canal";
+  EXPECT_GT(at(made->field, {-22, 195, -124}), 2) << "the canal";
 }
 
 TEST(RealCt, AScannersOwnSlicesAreSegmentedFromOneClick) {
