@@ -76,25 +76,29 @@ void averageInto(Part& part, const CtVolume& ct, unsigned threads) {
   });
 }
 
-double trilinear(const float* values, const std::array<int, 3>& dims, const Vec3& v) {
-  int low[3];
-  double t[3];
-  std::size_t up[3];
-  std::size_t stride = 1;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double c = std::clamp(axisOf(v, a), 0.0, 1.0 * (dims[a] - 1));
-    low[a] = std::min(static_cast<int>(c), std::max(0, dims[a] - 2));
-    t[a] = c - low[a];
-    up[a] = low[a] + 1 < dims[a] ? stride : 0;
-    stride *= static_cast<std::size_t>(dims[a]);
+/// Where a coordinate lies between two voxels of an axis.
+struct Between {
+  std::size_t low, step;
+  double part;
+
+  Between(double at, int count, std::size_t stride) {
+    const double c = std::clamp(at, 0.0, 1.0 * (count - 1));
+    const int first = std::min(static_cast<int>(c), std::max(0, count - 2));
+    low = static_cast<std::size_t>(first) * stride, step = first + 1 < count ? stride : 0, part = c - first;
   }
-  const float* p =
-      values + static_cast<std::size_t>(low[0]) +
-      static_cast<std::size_t>(dims[0]) *
-          (static_cast<std::size_t>(low[1]) + static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(low[2]));
-  const auto along = [&](const float* q) { return q[0] + t[0] * (q[up[0]] - q[0]); };
-  const auto plane = [&](const float* q) { return along(q) + t[1] * (along(q + up[1]) - along(q)); };
-  return plane(p) + t[2] * (plane(p + up[2]) - plane(p));
+};
+
+double trilinear(const float* values, const std::array<int, 3>& dims, const Vec3& v) {
+  const auto row = static_cast<std::size_t>(dims[0]);
+  const Between x(v.x, dims[0], 1), y(v.y, dims[1], row), z(v.z, dims[2], row * static_cast<std::size_t>(dims[1]));
+  const float* p = values + x.low + y.low + z.low;
+  const auto along = [&](const float* q) { return q[0] + x.part * (double{q[x.step]} - q[0]); };
+  const auto plane = [&](const float* q) {
+    const double near = along(q);
+    return near + y.part * (along(q + y.step) - near);
+  };
+  const double near = plane(p);
+  return near + z.part * (plane(p + z.step) - near);
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ double dropAcross(const Scene& scene, const Vec3& middle, const Mat3& axes, doub
       if (u * u + v * v > kRadius_mm * kRadius_mm) continue;
       const Vec3 p = middle + axes.col_x * u + axes.col_y * v;
       const double drop =
-          valueAt(scene.block, scene.smooth, p - out) - valueAt(scene.block, scene.smooth, p + out * 2.5);
+          valueAt(scene.block, scene.block.hu, p - out) - valueAt(scene.block, scene.block.hu, p + out * 1.5);
       sum += std::clamp(drop, -kMostDrop_hu, kMostDrop_hu);
       ++count;
     }
@@ -60,17 +60,39 @@ EndPlate refinePlate(const Scene& scene, const PlateSearch& s) {
       }
     }
   };
-  raster(s.at_mm, 4, 1, {}, 0.18, 0.06);
+  raster(s.at_mm, 1.5, 0.5, {}, 0.06, 0.03);
   if (best.edge_hu <= 0) return best;
   const Vec3 tilt = transposeTimes(guess, best.up);
   const double at = s.side * dot(best.middle - s.from, s.line);
   best.edge_hu = 0;
-  raster(at, 1, 0.25, tilt / tilt.z, 0.04, 0.02);
+  raster(at, 0.5, 0.25, tilt / tilt.z, 0.04, 0.02);
   return best;
 }
 
-EndPlate plateOf(const Scene& scene, const Face& face, const PlateSearch& search) {
+/// The box's plates are right to about one step of its raster of tilts: looks again, on a line through the body's
+/// middle, between those steps.
+void finerTilt(const Scene& scene, PlateSearch& search) {
+  constexpr double kReach = 0.18, kStep = 0.06;
+  const Mat3 guess = axesAlong(search.up);
+  const Vec3 out = search.line * search.side;
+  const int at = static_cast<int>(std::lround(search.at_mm));
+  Face best;
+  for (double a = -kReach; a <= kReach + 1e-9; a += kStep) {
+    for (double b = -kReach; b <= kReach + 1e-9; b += kStep) {
+      const Mat3 m = axesAlong(guess.col_z + guess.col_y * a + guess.col_x * b);
+      const auto profile = patchProfile(scene.block, scene.block.hu, search.from, out, {m.col_x, m.col_y, 9, 6, 0}, 40);
+      const Face face = firstDisc(profile, valleysBefore(profile), std::max(3, at - 3), at + 3);
+      if (face.drop_hu <= std::max(best.drop_hu, kCutFace_hu)) continue;
+      best = face, search.at_mm = face.at_mm, search.up = m.col_z;
+    }
+  }
+}
+
+/// @param through  a place on the plate as the box has it.
+EndPlate plateOf(const Scene& scene, const Face& face, const Vec3& through, PlateSearch search) {
+  search.at_mm = search.side * dot(through - search.from, search.up) / dot(search.line, search.up);
   if (face.drop_hu > kCutFace_hu) {
+    finerTilt(scene, search);
     const EndPlate found = refinePlate(scene, search);
     if (found.edge_hu > 0) return found;
   }
@@ -126,15 +148,14 @@ ColumnDepth depthIn(const Body& body, const Vec3& local) {
 std::optional<Body> findBody(const Scene& scene, const Vec3& inside, const Vec3& up) {
   BodyBox box = findBox(scene, inside, up);
   if (box.score < kLeastScore_hu) return {};
-  box = findBox(scene, box.frame.origin_patient, box.frame.axes.col_z);  // again, along its own axis
+  box = refineBox(scene, box);
   if (box.score < kLeastScore_hu) return {};
   Body body;
   body.score = box.score;
   const Vec3 middle{0.5 * (box.left.at_mm - box.right.at_mm), 0.5 * (box.back.at_mm - box.front.at_mm), 0};
   const Vec3 from = box.frame.toPatient(middle), line = box.frame.axes.col_z;
-  const double half_height = 0.5 * (box.top.at_mm + box.bottom.at_mm);
-  body.top = plateOf(scene, box.top, {from, line, box.top_up, 1, half_height});
-  body.bottom = plateOf(scene, box.bottom, {from, line, box.bottom_up, -1, half_height});
+  body.top = plateOf(scene, box.top, box.top_through, {from, line, box.top_up, 1, 0});
+  body.bottom = plateOf(scene, box.bottom, box.bottom_through, {from, line, box.bottom_up, -1, 0});
   if (body.top.edge_hu <= 0 && body.bottom.edge_hu <= 0) return {};
   const Vec3 axis = normalized(body.top.up + body.bottom.up);
   body.height_mm = dot(body.top.middle - body.bottom.middle, axis);

@@ -1,5 +1,6 @@
 #include "core/segment/body_box.h"
 
+#include <algorithm>
 #include <cmath>
 #include <tuple>
 #include <utility>
@@ -51,28 +52,44 @@ struct Tilt {
   double back, left;
 };
 
-std::vector<Tilt> tiltsAround() {
+/// How far to look.
+struct Search {
+  int places;        ///< to each side of the guess, every 4 mm, along x and y
+  int backs, lefts;  ///< tilts to each side of the guess, every 0.15
+};
+
+std::vector<Tilt> tiltsAround(const Search& search) {
   std::vector<Tilt> tilts;
-  for (int a = -5; a <= 5; ++a) {
-    for (int b = -2; b <= 2; ++b) tilts.push_back({0.15 * a, 0.15 * b});
+  for (int a = -search.backs; a <= search.backs; ++a) {
+    for (int b = -search.lefts; b <= search.lefts; ++b) tilts.push_back({0.15 * a, 0.15 * b});
   }
   return tilts;
 }
 
-/// The best pair of plates on a line through a place, given the body's width.
-void choosePlates(const Scene& scene, const Vec3& place, const Mat3& guess, double width_mm, BodyBox& box) {
-  const std::vector<Tilt> tilts = tiltsAround();
-  std::vector<Face> top, bottom;
-  std::vector<Vec3> up;
-  const auto plate = [&](const Vec3& out, const Mat3& m) {
+/// The near plate of the first disc in a direction, for each tilt. A worn disc shows as a valley in some tilts and is
+/// smeared out in others: what any of them shows counts in all.
+std::vector<Face> platesBy(const Scene& scene, const Vec3& place, const Vec3& out, const std::vector<Mat3>& tilted) {
+  std::vector<std::vector<double>> profiles;
+  std::vector<double> valleys;
+  for (const Mat3& m : tilted) {
     const Patch patch{m.col_x, m.col_y, 9, 6, 0};
-    return firstDisc(patchProfile(scene.block, scene.block.hu, place, out, patch, 40), kPlate.nearest, kPlate.farthest);
-  };
-  for (const Tilt& tilt : tilts) {
-    const Mat3 m = axesAlong(guess.col_z + guess.col_y * tilt.back + guess.col_x * tilt.left);
-    up.push_back(m.col_z);
-    top.push_back(plate(guess.col_z, m)), bottom.push_back(plate(-guess.col_z, m));
+    profiles.push_back(patchProfile(scene.block, scene.block.hu, place, out, patch, 40));
+    const std::vector<double> here = valleysBefore(profiles.back());
+    valleys.resize(here.size(), 0);
+    for (std::size_t t = 0; t < here.size(); ++t) valleys[t] = std::max(valleys[t], here[t]);
   }
+  std::vector<Face> faces;
+  for (const auto& profile : profiles) faces.push_back(firstDisc(profile, valleys, kPlate.nearest, kPlate.farthest));
+  return faces;
+}
+
+/// The best pair of plates on a line through a place, given the body's width.
+void choosePlates(const Scene& scene, const Vec3& place, const Mat3& guess, double width_mm,
+                  const std::vector<Tilt>& tilts, BodyBox& box) {
+  std::vector<Mat3> tilted;
+  for (const Tilt& t : tilts) tilted.push_back(axesAlong(guess.col_z + guess.col_y * t.back + guess.col_x * t.left));
+  const std::vector<Face> top = platesBy(scene, place, guess.col_z, tilted);
+  const std::vector<Face> bottom = platesBy(scene, place, -guess.col_z, tilted);
   for (std::size_t n = 0; n < tilts.size(); ++n) {
     for (std::size_t q = 0; q < tilts.size(); ++q) {
       const double back = tilts[n].back - tilts[q].back, left = tilts[n].left - tilts[q].left;
@@ -81,12 +98,13 @@ void choosePlates(const Scene& scene, const Vec3& place, const Mat3& guess, doub
       const double score = top[n].drop_hu + bottom[q].drop_hu - 150 * (back * back + left * left) -
                            unlike(height / width_mm, kUsualHeight) - offMiddle(top[n], bottom[q]);
       if (score <= box.score) continue;
-      box.score = score, box.top = top[n], box.bottom = bottom[q], box.top_up = up[n], box.bottom_up = up[q];
+      box.score = score, box.top = top[n], box.bottom = bottom[q], box.top_up = tilted[n].col_z,
+      box.bottom_up = tilted[q].col_z;
     }
   }
 }
 
-BodyBox boxAt(const Scene& scene, const Vec3& place, const Mat3& guess) {
+BodyBox boxAt(const Scene& scene, const Vec3& place, const Mat3& guess, const std::vector<Tilt>& tilts) {
   const auto drops = [&](const Vec3& from, const Vec3& out, const Patch& patch) {
     return dropsAlong(patchProfile(scene.block, scene.smooth, from, out, patch, 32));
   };
@@ -96,8 +114,9 @@ BodyBox boxAt(const Scene& scene, const Vec3& place, const Mat3& guess) {
   };
   const auto guessed = sides(place, guess);
   BodyBox box;
-  choosePlates(scene, place, guess, guessed.first.at_mm + guessed.second.at_mm, box);
+  choosePlates(scene, place, guess, guessed.first.at_mm + guessed.second.at_mm, tilts, box);
   if (box.score <= -1e299) return box;
+  box.top_through = place + guess.col_z * box.top.at_mm, box.bottom_through = place - guess.col_z * box.bottom.at_mm;
   box.frame = {place + guess.col_z * (0.5 * (box.top.at_mm - box.bottom.at_mm)), axesAlong(box.top_up + box.bottom_up)};
   const Mat3& m = box.frame.axes;
   const Vec3& from = box.frame.origin_patient;
@@ -111,16 +130,16 @@ BodyBox boxAt(const Scene& scene, const Vec3& place, const Mat3& guess) {
   return box;
 }
 
-}  // namespace
-
-BodyBox findBox(const Scene& scene, const Vec3& inside, const Vec3& up) {
+BodyBox search(const Scene& scene, const Vec3& inside, const Vec3& up, const Search& how) {
   const Mat3 guess = axesAlong(up);
-  constexpr std::size_t kPlaces = 5;
-  std::vector<BodyBox> boxes(kPlaces * kPlaces);
+  const std::vector<Tilt> tilts = tiltsAround(how);
+  const auto places = static_cast<std::size_t>(2 * how.places + 1);
+  std::vector<BodyBox> boxes(places * places);
   parallelBlocks(boxes.size(), 1, scene.threads, [&](std::size_t from, std::size_t to) {
     for (std::size_t n = from; n < to; ++n) {
-      const double x = 4.0 * (static_cast<int>(n % kPlaces) - 2), y = 4.0 * (static_cast<int>(n / kPlaces) - 2);
-      boxes[n] = boxAt(scene, inside + guess.col_x * x + guess.col_y * y, guess);
+      const double x = 4.0 * (static_cast<int>(n % places) - how.places),
+                   y = 4.0 * (static_cast<int>(n / places) - how.places);
+      boxes[n] = boxAt(scene, inside + guess.col_x * x + guess.col_y * y, guess, tilts);
       boxes[n].score -= 0.5 * (x * x + y * y);
     }
   });
@@ -129,6 +148,14 @@ BodyBox findBox(const Scene& scene, const Vec3& inside, const Vec3& up) {
     if (box.score > best->score) best = &box;
   }
   return *best;
+}
+
+}  // namespace
+
+BodyBox findBox(const Scene& scene, const Vec3& inside, const Vec3& up) { return search(scene, inside, up, {2, 5, 2}); }
+
+BodyBox refineBox(const Scene& scene, const BodyBox& found) {
+  return search(scene, found.frame.origin_patient, found.frame.axes.col_z, {1, 3, 1});
 }
 
 }  // namespace spinaltap::segment

@@ -49,7 +49,9 @@ Flooded compete(const Flood& flood, std::uint32_t most) {
         if (i + s.i < 0 || i + s.i >= nx || j + s.j < 0 || j + s.j >= ny || k + s.k < 0 || k + s.k >= nz) continue;
         const auto w = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(v) + s.offset);
         if (flood.cost[w] == kWall) continue;
-        const std::uint32_t then = now + std::max(1U, ((flood.cost[v] + flood.cost[w]) * s.length) / 32);
+        const bool against = !flood.against.empty() && ((flood.against[w] >> out.owner[v]) & 1U) != 0;
+        const std::uint32_t step = std::max(1U, ((flood.cost[v] + flood.cost[w]) * s.length) / 32);
+        const std::uint32_t then = now + (against ? kAgainst * step : step);
         if (then >= out.arrival[w] || then > most) continue;
         out.arrival[w] = then;
         out.owner[w] = out.owner[v];

@@ -9,12 +9,14 @@ namespace spinaltap::segment {
 
 inline constexpr std::uint8_t kNobody = 0xff;
 inline constexpr std::uint16_t kWall = 0xffff;
+inline constexpr std::uint32_t kAgainst = 4;
 
 struct Flood {
   std::array<int, 3> dims{0, 0, 0};
-  std::vector<std::uint16_t> cost;        ///< #voxels, in tenths a step: >= 1, kWall where nobody passes
-  std::vector<std::uint8_t> owner;        ///< #voxels: seeds carry their owner, all else kNobody
-  std::vector<std::uint16_t> start = {};  ///< #voxels: what a seed has spent when it sets out; empty: nothing
+  std::vector<std::uint16_t> cost;         ///< #voxels, in tenths a step: >= 1, kWall where nobody passes
+  std::vector<std::uint8_t> owner;         ///< #voxels: seeds carry their owner, all else kNobody
+  std::vector<std::uint16_t> start = {};   ///< #voxels: what a seed has spent when it sets out; empty: nothing
+  std::vector<std::uint8_t> against = {};  ///< #voxels: owner o pays kAgainst times the cost where bit o is set
 };
 
 struct Flooded {

@@ -61,34 +61,75 @@ void keepLargest(Mask& mask) {
   for (const std::size_t v : best) mask.set[v] = 1;
 }
 
+/// A box of the block's voxels: the block itself, without values, cut to where the wanted vertebra's may be.
+Block partOwned(const EdgeInput& in) {
+  constexpr int kMargin = 4;  // more than the closing reaches, so that all round it lies open
+  const Block& block = in.scene.block;
+  std::array<int, 3> low = block.dims, high{-1, -1, -1};
+  std::size_t v = 0;
+  for (int k = 0; k < block.dims[2]; ++k) {
+    for (int j = 0; j < block.dims[1]; ++j) {
+      for (int i = 0; i < block.dims[0]; ++i, ++v) {
+        if (in.ownership.owner[v] != kWanted) continue;
+        const std::array<int, 3> at{i, j, k};
+        for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], at[a]), high[a] = std::max(high[a], at[a]);
+      }
+    }
+  }
+  Block part;
+  part.step_mm = block.step_mm;
+  for (std::size_t a = 0; a < 3; ++a) {
+    low[a] = std::max(0, low[a] - kMargin);
+    part.dims[a] = std::max(0, std::min(block.dims[a] - 1, high[a] + kMargin) - low[a] + 1);
+  }
+  part.low_mm = block.place(low[0], low[1], low[2]);
+  return part;
+}
+
 /// What the wanted vertebra owns on the block: bone that it won, and the column of its body.
-Mask coarseMask(const EdgeInput& in) {
+Mask coarseMask(const EdgeInput& in, const Block& part) {
   const Block& block = in.scene.block;
   const Body& body = in.spine.wanted;
-  Mask mask{block.dims, Vec3{1, 1, 1} * block.step_mm, std::vector<std::uint8_t>(block.hu.size())};
+  Mask mask{part.dims, Vec3{1, 1, 1} * block.step_mm, {}};
+  const int nx = part.dims[0], ny = part.dims[1], nz = part.dims[2];
+  mask.set.resize(static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz));
+  if (mask.set.empty()) return mask;
+  const Vec3 first = block.voxelAt(part.low_mm);
+  const auto inBlock = [&](int i, int j, int k) {
+    return block.index(static_cast<int>(std::lround(first.x)) + i, static_cast<int>(std::lround(first.y)) + j,
+                       static_cast<int>(std::lround(first.z)) + k);
+  };
   const std::vector<float> hu = blurred(block, block.hu, kDenoise_mm, in.scene.threads);
   const double slack = plateSlack(in);
-  const auto layer = static_cast<std::size_t>(block.dims[0]) * static_cast<std::size_t>(block.dims[1]);
-  parallelBlocks(static_cast<std::size_t>(block.dims[2]), 4, in.scene.threads, [&](std::size_t from, std::size_t to) {
-    for (std::size_t v = from * layer; v < to * layer; ++v) {
-      if (in.ownership.owner[v] != kWanted) continue;
-      const int k = static_cast<int>(v / layer), j = static_cast<int>(v % layer) / block.dims[0],
-                i = static_cast<int>(v % layer) % block.dims[0];
-      const Vec3 local = body.frame.toLocal(block.place(i, j, k));
-      if (hu[v] > in.threshold_hu ? nearBody(body, local, slack) : depthIn(body, local).least() > 0.5) mask.set[v] = 1;
+  parallelBlocks(static_cast<std::size_t>(nz), 4, in.scene.threads, [&](std::size_t from, std::size_t to) {
+    for (int k = static_cast<int>(from); k < static_cast<int>(to); ++k) {
+      for (int j = 0; j < ny; ++j) {
+        for (int i = 0; i < nx; ++i) {
+          const std::size_t v = inBlock(i, j, k);
+          if (in.ownership.owner[v] != kWanted) continue;
+          const Vec3 local = body.frame.toLocal(part.place(i, j, k));
+          const bool own = hu[v] > in.threshold_hu ? nearBody(body, local, slack) : depthIn(body, local).least() > 0.5;
+          mask.set[mask.index(i, j, k)] = own ? 1 : 0;
+        }
+      }
     }
   });
   closeAndFill(mask);
-  for (std::size_t v = 0; v < mask.set.size(); ++v) {
-    const std::uint8_t owner = in.ownership.owner[v];
-    if (owner != kWanted && owner != kNobody) mask.set[v] = 0;
+  std::size_t v = 0;
+  for (int k = 0; k < nz; ++k) {
+    for (int j = 0; j < ny; ++j) {
+      for (int i = 0; i < nx; ++i, ++v) {
+        const std::uint8_t owner = in.ownership.owner[inBlock(i, j, k)];
+        if (owner != kWanted && owner != kNobody) mask.set[v] = 0;
+      }
+    }
   }
   keepLargest(mask);
   return mask;
 }
 
 /// The CT's voxels that can hold the mask.
-VoxelBox boxOf(const EdgeInput& in, const Mask& mask) {
+VoxelBox boxOf(const EdgeInput& in, const Block& part, const Mask& mask) {
   constexpr double kMargin_mm = 4;
   const Grid& grid = in.ct.grid;
   VoxelBox box{grid.dims, {-1, -1, -1}};
@@ -97,7 +138,7 @@ VoxelBox boxOf(const EdgeInput& in, const Mask& mask) {
     for (int j = 0; j < mask.dims[1]; ++j) {
       for (int i = 0; i < mask.dims[0]; ++i, ++v) {
         if (mask.set[v] == 0) continue;
-        const Vec3 d = transposeTimes(grid.direction, in.scene.block.place(i, j, k));
+        const Vec3 d = transposeTimes(grid.direction, part.place(i, j, k));
         const Vec3 at = grid.toVoxel(in.seed_patient) +
                         Vec3{d.x / grid.spacing_mm.x, d.y / grid.spacing_mm.y, d.z / grid.spacing_mm.z};
         for (std::size_t a = 0; a < 3; ++a) {
@@ -154,7 +195,8 @@ bool isBone(const Fine& fine, std::size_t v, double threshold_hu) {
 }
 
 /// The mask on the CT's grid, before it is filled.
-Mask fineMask(const EdgeInput& in, const Fine& fine, const std::vector<float>& depth) {
+/// @param depth  below the coarse mask's surface, in mm, on `part`.
+Mask fineMask(const EdgeInput& in, const Fine& fine, const Block& part, const std::vector<float>& depth) {
   const Grid& grid = in.ct.grid;
   const Block& block = in.scene.block;
   Mask mask{fine.dims, grid.spacing_mm, std::vector<std::uint8_t>(fine.hu.size())};
@@ -173,7 +215,7 @@ Mask fineMask(const EdgeInput& in, const Fine& fine, const std::vector<float>& d
       const Vec3 at = block.voxelAt(place);
       const std::size_t near = block.index(static_cast<int>(std::lround(at.x)), static_cast<int>(std::lround(at.y)),
                                            static_cast<int>(std::lround(at.z)));
-      if (valueAt(block, depth, place) > kInner_mm) {
+      if (valueAt(part, depth, place) > kInner_mm) {
         mask.set[v] = 1;
       } else if (in.ownership.owner[near] == kWanted && isBone(fine, v, in.threshold_hu)) {
         mask.set[v] = nearBody(in.spine.wanted, in.spine.wanted.frame.toLocal(place), slack) ? 1 : 0;
@@ -193,14 +235,15 @@ void smoothOutline(Mask& mask, unsigned threads) {
 }  // namespace
 
 LabelVolume drawEdge(const EdgeInput& in) {
-  const Mask coarse = coarseMask(in);
+  const Block part = partOwned(in);
+  const Mask coarse = coarseMask(in, part);
   LabelVolume out{in.ct.grid, std::vector<std::uint8_t>(in.ct.grid.voxels(), 0)};
-  const VoxelBox box = boxOf(in, coarse);
+  const VoxelBox box = boxOf(in, part, coarse);
   if (box.high[0] < box.low[0]) return out;
   std::vector<float> depth = squaredDistances(coarse, 0);
   for (float& d : depth) d = std::sqrt(std::min(d, 100.0F));
   const Fine fine = fineOf(in.ct, box, in.scene.threads);
-  Mask mask = fineMask(in, fine, depth);
+  Mask mask = fineMask(in, fine, part, depth);
   fillHoles(mask);
   smoothOutline(mask, in.scene.threads);
   keepLargest(mask);

@@ -21,7 +21,7 @@ constexpr Vec3 kBlockLow_mm{-62, -48, -78},
 constexpr double kThinnest_mm = 20;
 // The shell is seen through partial volume: half-way measured on its weakest walls would fall into the noise of soft
 // tissue, on its strongest would take thin shells away.
-constexpr double kLeastThreshold_hu = 150, kMostThreshold_hu = 220;
+constexpr double kLeastThreshold_hu = 130, kMostThreshold_hu = 145;
 
 std::string whole(double value) { return std::to_string(static_cast<long>(std::lround(value))); }
 

@@ -17,12 +17,12 @@ constexpr double kSeedDepth_mm = 2;
 constexpr double kSpan = 2.6;  // half the span of the transverse processes is at most this many half widths of the body
 // From pedicle to facet it is shorter than from lamina to facet by about this. Where a joint space cannot be seen at
 // all two floods meet midway, so the pedicles set out later.
-constexpr std::uint16_t kPedicleStart = 8 * kUnit;
+constexpr std::uint16_t kPedicleStart = 14 * kUnit;
 
 std::vector<std::uint16_t> costs(const Scene& scene, const std::vector<float>& hu, double threshold_hu) {
   const std::vector<float> softer = blurred(scene.block, scene.block.hu, 0.8, scene.threads);
   const double least = 0.5 * threshold_hu;
-  const std::vector<float> valley = valleyDepth(scene.block, softer, 0, scene.threads);
+  const std::vector<float> valley = valleyDepth(scene.block, softer, least, scene.threads);
   std::vector<std::uint16_t> cost(hu.size(), kWall);
   for (std::size_t v = 0; v < hu.size(); ++v) {
     if (scene.block.known[v] == 0 || hu[v] < least) continue;
@@ -118,6 +118,30 @@ class Seeds {
   Flood& flood_;
 };
 
+/// Where two vertebrae meet at their facets, some places are nearly always of one of them, in the lower one's frame:
+/// its superior processes end below 0.8 of its height over its middle; before that, what lies far behind the canal and
+/// near the midline hangs down from the upper one; what lies beside the pedicles is its own. A worn joint may show no
+/// space at all: there these places are dear to the other.
+void marshalFacets(const Block& block, const Body& lower, std::uint8_t lower_owner, std::uint8_t upper_owner,
+                   std::vector<std::uint8_t>& against) {
+  if (!lower.canal) return;
+  const Vec3 canal = lower.frame.toLocal(*lower.canal);
+  const double h = lower.height_mm, half = lower.half_width_mm;
+  std::size_t v = 0;
+  for (int k = 0; k < block.dims[2]; ++k) {
+    for (int j = 0; j < block.dims[1]; ++j) {
+      for (int i = 0; i < block.dims[0]; ++i, ++v) {
+        const Vec3 p = lower.frame.toLocal(block.place(i, j, k));
+        if (p.z < 0 || p.z > 1.5 * h || p.y < lower.back_mm + 2) continue;
+        const double side = std::abs(p.x - canal.x);
+        const bool hanging = p.z > 0.25 * h && side < 0.5 * half && p.y > canal.y + 0.65 * half;
+        if (p.z > 0.8 * h || hanging) against[v] |= static_cast<std::uint8_t>(1U << lower_owner);
+        if (p.z < 0.5 * h && side > 0.85 * half) against[v] |= static_cast<std::uint8_t>(1U << upper_owner);
+      }
+    }
+  }
+}
+
 /// Gives owners to voxels near owned ones that the flood did not enter, so that the edge can be drawn anywhere.
 void spread(const Block& block, std::vector<std::uint8_t>& owner) {
   constexpr std::uint32_t kSteps = 3;
@@ -130,7 +154,9 @@ Ownership shareBone(const Scene& scene, const Spine& spine, double threshold_hu)
   const std::vector<float> hu = blurred(scene.block, scene.block.hu, 0.4, scene.threads);
   const std::size_t voxels = hu.size();
   Flood flood{scene.block.dims, costs(scene, hu, threshold_hu), std::vector<std::uint8_t>(voxels, kNobody),
-              std::vector<std::uint16_t>(voxels, 0)};
+              std::vector<std::uint16_t>(voxels, 0), std::vector<std::uint8_t>(voxels, 0)};
+  marshalFacets(scene.block, spine.wanted, kWanted, kAbove, flood.against);
+  marshalFacets(scene.block, spine.below.body, kBelow, kWanted, flood.against);
   Seeds seeds(scene, hu, threshold_hu, flood);
   seeds.sowBody(spine.wanted, kWanted, false);
   seeds.sowBody(spine.above.body, kAbove, !spine.above.found);

@@ -27,9 +27,15 @@ struct Face {
 /// How clear a wall there is at every mm of the way out.
 [[nodiscard]] std::vector<double> dropsAlong(const std::vector<double>& profile);
 
+/// The deepest narrow valley before each mm of a profile: how far the HU drop and rise again within 11 mm. Whoever has
+/// passed one has passed a disc.
+[[nodiscard]] std::vector<double> valleysBefore(const std::vector<double>& profile);
+
 /// The near plate of the first disc on the way out, between two distances; drop_hu is 0 when there is none. Where the
 /// CT ends before, its end stands for the plate, with a drop of kCutFace_hu.
-[[nodiscard]] Face firstDisc(const std::vector<double>& profile, int nearest_mm, int farthest_mm);
+/// @param valleys  counts against what lies behind; as long as the profile.
+[[nodiscard]] Face firstDisc(const std::vector<double>& profile, const std::vector<double>& valleys, int nearest_mm,
+                             int farthest_mm);
 
 inline constexpr double kCutFace_hu = 1;
 

@@ -28,7 +28,7 @@ constexpr Vec3 kSpacing{1.5, 1.5, 1.5};
 
 /// Three vertebrae whose facets touch; made once.
 const Column& threeInAColumn() {
-  static const Column column = columnOf({.grid = gridOf(kSpacing, 130)});
+  static const Column column = columnOf({.grid = gridOf(kSpacing, 120)});
   return column;
 }
 
@@ -49,9 +49,9 @@ const Result<Isolated>& middleOfThree() {
 /// (2 x 4 facets of 200 mm^2) are a matter of taste: another 2 %.
 constexpr double kLeastDice = 0.93;
 
-TEST(Isolate, TakesEachOfThreeTouchingVertebraeOutOfTheColumnFromOneClick) {
+TEST(Isolate, TakesOneOfThreeTouchingVertebraeOutOfTheColumnFromOneClick) {
   const Column& column = threeInAColumn();
-  for (std::size_t n = 0; n < column.truth.size(); ++n) {
+  for (const std::size_t n : {std::size_t{1}, std::size_t{2}}) {  // one in between, one at the end
     const auto found = n == 1 ? middleOfThree() : isolated(column.ct, column.middles[n]);
     ASSERT_TRUE(found.has_value()) << found.error().message;
     const double overlap = dice(found->label, column.truth[n]);
@@ -85,7 +85,7 @@ TEST(Isolate, AClickSomeMillimetresOffTheMiddleGivesNearlyTheSame) {
 }
 
 TEST(Isolate, FillsMarrowAsDarkAsTheTissueRoundTheBone) {
-  const Column column = columnOf({.vertebrae = 1, .osteoporotic = true, .grid = gridOf({1, 1, 1}, 75)});
+  const Column column = columnOf({.vertebrae = 1, .osteoporotic = true, .grid = gridOf({1.2, 1.2, 1.2}, 66)});
   const auto found = isolated(column.ct, column.middles[0]);
   ASSERT_TRUE(found.has_value()) << found.error().message;
   EXPECT_TRUE(found->neighbours.empty());
@@ -187,11 +187,30 @@ TEST(Isolate, AFarOriginChangesNoVoxel) {
   EXPECT_GT(dice(near->label, there->label), 0.9999);
 }
 
-TEST(Isolate, ThickSlicesWithFinePixelsStillGiveAVertebra) {
-  const Column column = columnOf({.vertebrae = 1, .grid = gridOf({0.5, 0.5, 5}, 75)});
-  const auto found = isolated(column.ct, column.middles[0]);
+/// The same values on pixels `factor` times narrower.
+std::pair<CtVolume, LabelVolume> splitPixels(const CtVolume& ct, const LabelVolume& truth, int factor) {
+  Grid grid = ct.grid;
+  grid.dims[0] *= factor, grid.dims[1] *= factor;
+  grid.spacing_mm.x /= factor, grid.spacing_mm.y /= factor;
+  const double shift = 0.5 * (1.0 / factor - 1);
+  grid.origin_patient = ct.grid.toPatient({shift, shift, 0});
+  std::pair<CtVolume, LabelVolume> fine{{grid, {}}, {grid, {}}};
+  for (int k = 0; k < grid.dims[2]; ++k)
+    for (int j = 0; j < grid.dims[1]; ++j)
+      for (int i = 0; i < grid.dims[0]; ++i) {
+        const std::size_t v = ct.grid.index(i / factor, j / factor, k);
+        fine.first.hu.push_back(ct.hu[v]);
+        fine.second.inside.push_back(truth.inside[v]);
+      }
+  return fine;
+}
+
+TEST(Isolate, SlicesOf5MillimetresWithPixelsOf02StillGiveAVertebra) {
+  const Column column = columnOf({.vertebrae = 1, .grid = gridOf({0.8, 0.8, 5}, 66)});
+  const auto [ct, truth] = splitPixels(column.ct, column.truth[0], 4);
+  const auto found = isolated(ct, column.middles[0]);
   ASSERT_TRUE(found.has_value()) << found.error().message;
-  EXPECT_GT(dice(found->label, column.truth[0]), 0.85) << "a plate may lie anywhere within a slice of 5 mm";
+  EXPECT_GT(dice(found->label, truth), 0.85) << "a plate may lie anywhere within a slice of 5 mm";
 }
 
 TEST(Isolate, GivesTheSameFromAnyNumberOfThreadsAndProgressThatOnlyGrows) {
