@@ -69,7 +69,7 @@ LocalShape shapeAround(const SurfacePoints& points, std::size_t which, double ra
   out.normal = normalized(n - u * c[1] - v * c[2]);
   out.height_mm = c[0] * radius_mm;
   double rest = sums.squares;
-  for (std::size_t i = 0; i < kTerms; ++i) rest -= c[i] * sums.right[i];
+  for (std::size_t i = 0; i < kTerms; ++i) rest -= c[i] * (sums.right[i] + kRidge[i] * c[i]);  // the ridge is no height
   out.rms_mm = std::sqrt(std::max(rest, 0.0) / sums.weight) * radius_mm;
   return out;
 }
