@@ -32,8 +32,9 @@ struct SegmentOptions {
 
 struct ReconstructOptions {
   std::string data, case_id;
-  double sample_spacing_mm = surface::kSampleSpacing_mm, tolerance_mm = surface::kFitTolerance_mm;
-  std::optional<double> smoothing_mm;
+  std::string method = "subvoxel";
+  double tolerance_mm = surface::kFitTolerance_mm;
+  std::optional<double> sample_spacing_mm, smoothing_mm;
   double cell_mm = surface::kCell_mm;
 };
 

@@ -87,7 +87,11 @@ void addReconstruct(Program& program) {
   auto o = std::make_shared<ReconstructOptions>();
   CLI::App* sub = add(program, "reconstruct", "Make the smooth surface, its mesh and the density", o, runReconstruct);
   sub->add_option("CASE", o->case_id, "Case id")->required();
-  sub->add_option("--sample-spacing", o->sample_spacing_mm, "Between boundary points, mm")->capture_default_str();
+  sub->add_option("--method", o->method,
+                  "How the boundary is sampled; pixel and normal are the report's, from the label")
+      ->check(oneOf({"pixel", "normal", "subvoxel"}))
+      ->capture_default_str();
+  sub->add_option("--sample-spacing", o->sample_spacing_mm, "Between boundary points, mm (default: by the voxels)");
   sub->add_option("--tolerance", o->tolerance_mm, "Centres are left out while the surface moves by less than this, mm")
       ->capture_default_str();
   sub->add_option("--smoothing", o->smoothing_mm,

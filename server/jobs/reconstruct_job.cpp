@@ -5,7 +5,7 @@
 
 #include "core/mesh/parts.h"
 #include "core/mesh/polygonise.h"
-#include "core/surface/surface.h"
+#include "core/surface/methods.h"
 #include "core/volume/crop.h"
 #include "core/wire/mesh_message.h"
 #include "server/jobs/case_files.h"
@@ -60,24 +60,31 @@ std::function<void(double)> stage(const Progress& progress, const char* name) {
   return [&progress, name](double fraction) { progress(name, fraction); };
 }
 
+Result<surface::SampledSurface> sampleRegion(const Region& region, const ReconstructJob& job, double spacing_mm,
+                                             const Progress& progress) {
+  surface::BoundaryOptions options;
+  options.spacing_mm = spacing_mm;
+  return surface::sampleSurface(region.ct, region.label, job.method, options, stage(progress, "boundary"));
+}
+
 }  // namespace
 
 Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, const Progress& progress) {
   Stopwatch total, watch;
   const auto row = store.findCase(job.case_id);
   if (!row) return tl::unexpected(row.error());
+  if (progress) progress("load", 0);
   const auto region = cropRegion(store, *row);
   if (!region) return tl::unexpected(region.error());
+  const double load_s = watch.lap_s();
 
-  surface::BoundaryOptions boundary;
-  boundary.spacing_mm = job.sample_spacing_mm;
-  const auto points = surface::findBoundary(region->ct, region->label, boundary, stage(progress, "boundary"));
-  if (!points) return tl::unexpected(points.error());
-  auto signed_samples = surface::makeSamples(*points);
-  if (!signed_samples) return tl::unexpected(signed_samples.error());
+  const double spacing_mm = job.sample_spacing_mm.value_or(surface::sampleSpacingFor(region->ct.grid.spacing_mm));
+  auto sampled = sampleRegion(*region, job, spacing_mm, progress);
+  if (!sampled) return tl::unexpected(sampled.error());
+  const surface::OrientedPoints& points = sampled->points;
   const double boundary_s = watch.lap_s();
 
-  const rbf::Samples samples{std::move(signed_samples->positions), std::move(signed_samples->distances_mm)};
+  const rbf::Samples samples{std::move(sampled->samples.positions), std::move(sampled->samples.distances_mm)};
   rbf::FitOptions options;
   options.smoothing = job.smoothing_mm.value_or(rbf::kAutoSmoothing);
   options.reduce_mm = job.tolerance_mm;
@@ -85,16 +92,20 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
   if (!fit) return tl::unexpected(fit.error());
   const double fit_s = watch.lap_s();
 
-  const Field field = rbf::asField(fit->model, lipschitzOf(fit->model), surface::kFieldTolerance_mm);
-  const auto all_parts = mesh::polygonise(field, points->positions_patient,
-                                          meshOptions(points->positions_patient, job.cell_mm), stage(progress, "mesh"));
+  const Field field = rbf::asField(fit->model, lipschitzOf(fit->model), surface::kMeshTolerance_mm);
+  const auto all_parts = mesh::polygonise(field, points.positions_patient,
+                                          meshOptions(points.positions_patient, job.cell_mm), stage(progress, "mesh"));
   if (!all_parts) return tl::unexpected(all_parts.error());
   const mesh::TriangleMesh mesh = mesh::largestPart(*all_parts);  // coarse scans leave specks
   const double mesh_s = watch.lap_s();
 
   Figures figures{{"case_id", row->id},
-                  {"boundary_points", points->positions_patient.size()},
-                  {"boundary_points_from_ct", points->from_ct},
+                  {"method", std::string(surface::nameOf(job.method))},
+                  {"sample_spacing_mm", spacing_mm},
+                  {"boundary_points", points.positions_patient.size()},
+                  {"boundary_points_from_ct", points.from_ct},
+                  {"blur_mm", {points.scanner.blur_mm.x, points.scanner.blur_mm.y, points.scanner.blur_mm.z}},
+                  {"cortical_hu", points.scanner.cortical_hu},
                   {"samples", fit->report.samples},
                   {"centres", fit->report.centres},
                   {"residual_max_mm", fit->report.residual_max_mm},
@@ -107,12 +118,15 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
                   {"vertices", mesh.vertices.size()},
                   {"triangles", mesh.triangles.size()},
                   {"roi_dims", region->ct.grid.dims},
+                  {"load_s", load_s},
                   {"boundary_s", boundary_s},
                   {"fit_s", fit_s},
-                  {"mesh_s", mesh_s},
-                  {"total_s", total.lap_s()}};
+                  {"mesh_s", mesh_s}};
+  if (progress) progress("keep", 0);
   const auto kept = keep(store, row->id, region->ct, fit->model, mesh, figures);
   if (!kept) return tl::unexpected(kept.error());
+  figures["keep_s"] = watch.lap_s();
+  figures["total_s"] = total.lap_s();
   return figures;
 }
 

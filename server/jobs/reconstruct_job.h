@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "core/surface/defaults.h"
+#include "core/surface/methods.h"
 #include "server/jobs/figures.h"
 #include "server/store/store.h"
 
@@ -11,7 +11,8 @@ namespace spinaltap::jobs {
 
 struct ReconstructJob {
   std::string case_id;
-  double sample_spacing_mm = surface::kSampleSpacing_mm;
+  surface::Method method = surface::Method::Subvoxel;  ///< the others are the report's, for comparison
+  std::optional<double> sample_spacing_mm;             ///< default: surface::sampleSpacingFor the voxels
   double tolerance_mm = surface::kFitTolerance_mm;
   std::optional<double> smoothing_mm;  ///< default: as the samples' noise asks
   double cell_mm = surface::kCell_mm;
@@ -20,9 +21,7 @@ struct ReconstructJob {
 /// The CT kept for the browser is the vertebra's box and this much around it.
 inline constexpr double kRoiMargin_mm = 15;
 
-/// Figures: case_id, boundary_points, boundary_points_from_ct, samples, centres, residual_max_mm, residual_rms_mm,
-/// reduction_max_mm, tolerance_mm, noise_mm, smoothing_mm, sum_abs_weights, vertices, triangles, roi_dims, boundary_s,
-/// fit_s, mesh_s, total_s.
+/// Figures: the keys of server/cli/README.md. Stages: load, boundary, fit, mesh, keep.
 /// @error NotFound (no label yet), and those of surface, rbf and mesh.
 [[nodiscard]] Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, const Progress& progress);
 
