@@ -12,6 +12,7 @@ namespace spinaltap::cli {
 struct Outcome {
   jobs::Figures figures;
   bool done = true;
+  std::string text = {};  ///< for people, instead of the figures one by one
 };
 
 [[nodiscard]] Result<Outcome> runPhantom(const PhantomOptions& options, ProgressBar& bar);
@@ -20,6 +21,7 @@ struct Outcome {
 [[nodiscard]] Result<Outcome> runReconstruct(const ReconstructOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runExport(const ExportOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runFit(const FitOptions& options, ProgressBar& bar);
+[[nodiscard]] Result<Outcome> runTradeoff(const TradeoffOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runPlan(const PlanOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runDrill(const DrillOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runReplay(const ReplayOptions& options, ProgressBar& bar);
@@ -29,6 +31,8 @@ struct Outcome {
 
 /// "x,y,z" (also separated by blanks). @error InvalidArgument, naming `option`.
 [[nodiscard]] Result<Vec3> parseVec3(const std::string& text, const char* option);
+/// "auto" (rbf::kAutoSmoothing) or mm from 0. @error InvalidArgument.
+[[nodiscard]] Result<double> parseSmoothing(const std::string& text);
 [[nodiscard]] Result<store::Store> openStore(const std::string& data);
 
 }  // namespace spinaltap::cli

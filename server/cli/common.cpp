@@ -2,6 +2,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/rbf/rbf.h"
 #include "server/cli/commands.h"
 
 namespace spinaltap::cli {
@@ -29,6 +30,17 @@ Result<Vec3> parseVec3(const std::string& text, const char* option) {
   skipBlanks();
   if (at != end) return wrong();
   return Vec3{values[0], values[1], values[2]};
+}
+
+Result<double> parseSmoothing(const std::string& text) {
+  if (text == "auto") return rbf::kAutoSmoothing;
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0) || !std::isfinite(value)) {
+    return fail(ErrorCode::InvalidArgument,
+                "--smoothing needs auto or a number from 0, not '" + text.substr(0, 40) + "'");
+  }
+  return value;
 }
 
 Result<store::Store> openStore(const std::string& data) {

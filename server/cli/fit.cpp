@@ -1,27 +1,9 @@
-
-#include <charconv>
-
 #include "server/cli/commands.h"
 #include "server/jobs/fit_job.h"
 
 namespace spinaltap::cli {
-namespace {
-
-Result<double> smoothingOf(const std::string& text) {
-  if (text == "auto") return rbf::kAutoSmoothing;
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0)) {
-    return fail(ErrorCode::InvalidArgument,
-                "--smoothing needs auto or a number from 0, not '" + text.substr(0, 40) + "'");
-  }
-  return value;
-}
-
-}  // namespace
-
 Result<Outcome> runFit(const FitOptions& options, ProgressBar& bar) {
-  const auto smoothing = smoothingOf(options.smoothing);
+  const auto smoothing = parseSmoothing(options.smoothing);
   if (!smoothing) return tl::unexpected(smoothing.error());
   jobs::FitJob job;
   job.samples = options.file;

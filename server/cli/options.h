@@ -51,6 +51,14 @@ struct FitOptions {
   bool gradients = false;
 };
 
+struct TradeoffOptions {
+  std::string data, case_id, out;
+  bool surface = false, osteoporotic = false;
+  std::vector<std::string> methods, smoothings;
+  double sample_spacing_mm = 0;  ///< 0: as reconstruct chooses
+  int reduce = 1;
+};
+
 struct PlanOptions {
   std::string data, case_id, label, entry, target;
   plan::Bit bit;

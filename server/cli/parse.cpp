@@ -140,6 +140,28 @@ void addFit(Program& program) {
   sub->add_option("--threads", o->threads, "At most so many; 0: all")->capture_default_str();
 }
 
+void addTradeoff(Program& program) {
+  auto o = std::make_shared<TradeoffOptions>();
+  CLI::App* sub =
+      add(program, "tradeoff", "Measure what accuracy costs: a table, charts and silhouettes", o, runTradeoff);
+  CLI::Option* phantom_case =
+      sub->add_option("CASE", o->case_id, "Case with a label (default: the phantom, whose truth is known)");
+  sub->add_flag("--surface", o->surface, "The surface: methods, smoothing, tolerance, reduction")->required();
+  sub->add_option("--method", o->methods, "Only these")->check(oneOf({"pixel", "normal", "subvoxel"}));
+  sub->add_option(
+      "--smoothing", o->smoothings,
+      "Each method with these (auto or mm) alone (default: the report's 0, 0.5 and 30, and ours in detail)");
+  sub->add_option("--sample-spacing", o->sample_spacing_mm, "Between boundary points, mm (default: by the voxels)")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--out", o->out, "Folder for the pictures (SVG)");
+  sub->add_option("--reduce", o->reduce, "The phantom's voxels this many times wider: a quick look")
+      ->excludes(phantom_case)
+      ->check(CLI::Range(1, 8))
+      ->capture_default_str();
+  sub->add_flag("--osteoporotic", o->osteoporotic, "The phantom with a thin shell")->excludes(phantom_case);
+  sub->add_option("--data", o->data, kDataHelp);
+}
+
 void addPlan(Program& program) {
   auto o = std::make_shared<PlanOptions>();
   CLI::App* sub = add(program, "plan", "Plan a path and make its points; prints its id", o, runPlan);
@@ -234,7 +256,11 @@ int execute(const Program& program) {
     printError(outcome.error().message);
     return kFailed;
   }
-  if (!outcome->figures.is_null()) print(outcome->figures, program.json);
+  if (!outcome->text.empty() && !program.json) {
+    std::fputs(outcome->text.c_str(), stdout);
+  } else if (!outcome->figures.is_null()) {
+    print(outcome->figures, program.json);
+  }
   return outcome->done ? kDone : kFailed;
 }
 
@@ -251,6 +277,7 @@ int run(int argc, char** argv) {
   addReconstruct(program);
   addExport(program);
   addFit(program);
+  addTradeoff(program);
   addPlan(program);
   addDrill(program);
   addRest(program);

@@ -1,0 +1,36 @@
+#include "server/cli/commands.h"
+#include "server/jobs/tradeoff_job.h"
+
+namespace spinaltap::cli {
+
+Result<Outcome> runTradeoff(const TradeoffOptions& options, ProgressBar& bar) {
+  jobs::TradeoffJob job;
+  job.case_id = options.case_id;
+  job.reduce = options.reduce;
+  job.osteoporotic = options.osteoporotic;
+  job.sample_spacing_mm = options.sample_spacing_mm;
+  job.out = options.out;
+  for (const std::string& name : options.methods) {
+    if (const auto method = surface::methodOf(name)) job.methods.push_back(*method);
+  }
+  for (const std::string& text : options.smoothings) {
+    const auto value = parseSmoothing(text);
+    if (!value) return tl::unexpected(value.error());
+    job.smoothings.push_back(*value);
+  }
+  std::optional<store::Store> store;
+  if (!options.case_id.empty()) {
+    auto opened = openStore(options.data);
+    if (!opened) return tl::unexpected(opened.error());
+    store.emplace(std::move(*opened));
+  }
+  auto figures = jobs::surfaceTradeoff(store ? &*store : nullptr, job, bar.callback());
+  if (!figures) return tl::unexpected(figures.error());
+  std::string table = jobs::tradeoffTable(*figures);
+  if (figures->contains("files")) {
+    for (const auto& file : (*figures)["files"]) table += options.out + "/" + file.get<std::string>() + "\n";
+  }
+  return Outcome{std::move(*figures), true, std::move(table)};
+}
+
+}  // namespace spinaltap::cli
