@@ -26,7 +26,9 @@ inline constexpr double kFieldTolerance_mm = 1e-3;
 inline constexpr double kMeshTolerance_mm = 5e-3;
 /// Mesh cells: near the voxel size, so that the flat facets add less than 0.05 mm on a radius of 3 mm.
 inline constexpr double kCell_mm = 0.7;
-/// The mesh is sought in the label's box widened by this.
+/// The mesh is sought in the points' box widened by this.
 inline constexpr double kMeshMargin_mm = 4.0;
+/// Or by this: heavy smoothing swells a bone, and beyond the last slice the report's methods do not say where it ends.
+inline constexpr double kWideMeshMargin_mm = 16.0, kHeavySmoothing_mm = 1.0;
 
 }  // namespace spinaltap::surface

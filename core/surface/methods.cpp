@@ -120,6 +120,10 @@ std::optional<Method> methodOf(std::string_view name) {
   return std::nullopt;
 }
 
+double meshMarginFor(Method method, double smoothing_mm) {
+  return method == Method::Subvoxel && smoothing_mm <= kHeavySmoothing_mm ? kMeshMargin_mm : kWideMeshMargin_mm;
+}
+
 Result<SampledSurface> sampleSurface(const volume::CtVolume& ct, const volume::LabelVolume& label, Method method,
                                      const BoundaryOptions& options, const Progress& progress) {
   if (method != Method::Subvoxel) return sampleLabel(label, method);

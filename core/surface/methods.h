@@ -23,6 +23,9 @@ enum class Method : std::uint8_t { Pixel, Normal, Subvoxel };
 [[nodiscard]] std::string_view nameOf(Method method);
 [[nodiscard]] std::optional<Method> methodOf(std::string_view name);
 
+/// How far around the points the mesh is to be sought: the usual margin, or the wide one.
+[[nodiscard]] double meshMarginFor(Method method, double smoothing_mm);
+
 /// Samples, and the boundary points that they are about (the normals of Pixel are those of Normal, zero where there is
 /// none).
 struct SampledSurface {

@@ -22,7 +22,6 @@ constexpr double kFarthest_mm = 20;     // a foot that is farther counts with th
 constexpr std::size_t kSeedStride = 8;  // of the points, for the mesh to start from
 constexpr double kTimedBand_mm = 2;     // timed points lie so near the bone, as those of a point volume do
 constexpr double kEvaluate_mm = 1e-4;   // to which values are asked for
-constexpr double kSwollen_mm = 12;      // heavy smoothing swells a bone: the mesh is sought so much farther out
 
 /// The share of the whole that each stage takes, about.
 class Shares {
@@ -183,7 +182,7 @@ Result<Scene> caseScene(volume::CtVolume ct, volume::LabelVolume label) {
 std::vector<Setting> usualSettings() {
   std::vector<Setting> out;
   for (const Method method : {Method::Pixel, Method::Normal, Method::Subvoxel}) {
-    for (const double smoothing : {0.0, 0.5, 30.0, kHeavySmoothing_mm}) out.push_back({method, 0.01, smoothing, 0});
+    for (const double smoothing : {0.0, 0.5, 30.0, kSwellingSmoothing_mm}) out.push_back({method, 0.01, smoothing, 0});
   }
   for (const double tolerance : {0.1, 0.01, 0.001}) {
     out.push_back({Method::Subvoxel, tolerance, rbf::kAutoSmoothing, 0});
@@ -222,8 +221,7 @@ Result<Run> runSetting(const Scene& scene, const Setting& setting, const RunOpti
   const Field field = rbf::asField(fit->model, kUnknown, options.field_tolerance_mm);
 
   start = clock();
-  const bool swollen = setting.smoothing > 1;
-  const Box box = boxOf(points, surface::kMeshMargin_mm + (swollen ? kSwollen_mm : 0));
+  const Box box = boxOf(points, surface::meshMarginFor(setting.method, setting.smoothing));
   auto mesh =
       mesh::polygonise(field, seedsOf(field, points), {options.cell_mm, box.low, box.high}, shares.stage(0.6, 0.7));
   if (!mesh) {

@@ -37,7 +37,7 @@ struct Setting {
 
 /// So much that pixels swell the bone by millimetres, as the report saw with 30: its fitter scales smoothing by what it
 /// does not state.
-inline constexpr double kHeavySmoothing_mm = 300;
+inline constexpr double kSwellingSmoothing_mm = 300;
 
 /// What the program's tables show: each method with smoothing 0, 0.5 and 30, as in the report, and with heavy
 /// smoothing; then for ours the smoothing chosen from the noise, tolerances, and reductions.

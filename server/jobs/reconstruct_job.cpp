@@ -33,13 +33,13 @@ Result<Region> cropRegion(store::Store& store, const store::Case& row) {
   return Region{std::move(*ct_roi), std::move(*label_roi)};
 }
 
-mesh::PolygoniseOptions meshOptions(const std::vector<Vec3>& points, double cell_mm) {
+mesh::PolygoniseOptions meshOptions(const std::vector<Vec3>& points, double cell_mm, double margin_mm) {
   Vec3 low = points.front(), high = points.front();
   for (const Vec3& p : points) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  const Vec3 margin = Vec3{1, 1, 1} * surface::kMeshMargin_mm;
+  const Vec3 margin = Vec3{1, 1, 1} * margin_mm;
   return {cell_mm, low - margin, high + margin};
 }
 
@@ -93,8 +93,10 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
   const double fit_s = watch.lap_s();
 
   const Field field = rbf::asField(fit->model, lipschitzOf(fit->model), surface::kMeshTolerance_mm);
-  const auto all_parts = mesh::polygonise(field, points.positions_patient,
-                                          meshOptions(points.positions_patient, job.cell_mm), stage(progress, "mesh"));
+  const double margin_mm = surface::meshMarginFor(job.method, job.smoothing_mm.value_or(0));
+  const auto all_parts =
+      mesh::polygonise(field, points.positions_patient, meshOptions(points.positions_patient, job.cell_mm, margin_mm),
+                       stage(progress, "mesh"));
   if (!all_parts) return tl::unexpected(all_parts.error());
   const mesh::TriangleMesh mesh = mesh::largestPart(*all_parts);  // coarse scans leave specks
   const double mesh_s = watch.lap_s();

@@ -10,7 +10,7 @@
 namespace spinaltap::jobs {
 
 /// The report's three smoothings and a heavy one, which the silhouettes and bars compare.
-inline constexpr std::array<double, 4> kReportSmoothings{0.0, 0.5, 30.0, tradeoff::kHeavySmoothing_mm};
+inline constexpr std::array<double, 4> kReportSmoothings{0.0, 0.5, 30.0, tradeoff::kSwellingSmoothing_mm};
 
 /// One method's outlines in a view, at each of kReportSmoothings.
 using Outlines = std::array<std::vector<tradeoff::Polyline>, kReportSmoothings.size()>;

@@ -59,7 +59,7 @@ TEST(SurfaceTradeoff, PixelsWithoutSmoothingAreRough) {
 TEST(SurfaceTradeoff, SmoothingTakesTheRoughnessAndTheTruth) {
   const Measured& none = known(Method::Pixel, 0);
   const Measured& some = known(Method::Pixel, 30);
-  const Measured& heavy = known(Method::Pixel, kHeavySmoothing_mm);
+  const Measured& heavy = known(Method::Pixel, kSwellingSmoothing_mm);
   EXPECT_LT(some.roughness_mm, none.roughness_mm);
   EXPECT_LT(heavy.roughness_mm, some.roughness_mm);
   EXPECT_GT(heavy.surface.rms_mm, none.surface.rms_mm);
