@@ -33,7 +33,9 @@ struct Made {
 };
 
 Result<Made> reconstruct(const volume::CtVolume& ct, const volume::LabelVolume& label) {
-  const auto points = surface::findBoundary(ct, label);
+  surface::BoundaryOptions boundary;
+  boundary.spacing_mm = surface::sampleSpacingFor(ct.grid.spacing_mm);
+  const auto points = surface::findBoundary(ct, label, boundary);
   if (!points) return tl::unexpected(points.error());
   auto samples = surface::makeSamples(*points);
   if (!samples) return tl::unexpected(samples.error());
