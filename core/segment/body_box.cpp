@@ -126,7 +126,7 @@ BodyBox boxAt(const Scene& scene, const Vec3& place, const Mat3& guess, const st
   std::tie(box.back, box.front) =
       oppositeWalls(drops(from, m.col_y, patch), drops(from, -m.col_y, patch), kDepth, kUsualDepth * width);
   for (const Face* f : {&box.left, &box.right, &box.front, &box.back}) box.score += f->drop_hu;
-  box.score -= unlike((box.front.at_mm + box.back.at_mm) / width, kUsualDepth) + 0.5 * unlike(width, kUsualWidth_mm);
+  box.score -= unlike((box.front.at_mm + box.back.at_mm) / width, kUsualDepth) + unlike(width, kUsualWidth_mm);
   return box;
 }
 
@@ -155,7 +155,7 @@ BodyBox search(const Scene& scene, const Vec3& inside, const Vec3& up, const Sea
 BodyBox findBox(const Scene& scene, const Vec3& inside, const Vec3& up) { return search(scene, inside, up, {2, 5, 2}); }
 
 BodyBox refineBox(const Scene& scene, const BodyBox& found) {
-  return search(scene, found.frame.origin_patient, found.frame.axes.col_z, {1, 3, 1});
+  return search(scene, found.frame.origin_patient, found.frame.axes.col_z, {2, 3, 1});
 }
 
 }  // namespace spinaltap::segment

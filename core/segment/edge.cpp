@@ -33,6 +33,8 @@ double axisOf(const Vec3& v, std::size_t a) { return a == 0 ? v.x : a == 1 ? v.y
 bool nearBody(const Body& body, const Vec3& local, double plate_mm) {
   constexpr double kSpur_mm = 8, kRim_mm = 5;
   if (local.y > body.back_mm - 2) return true;
+  if (local.y > 0 && std::abs(local.x) > 0.8 * body.half_width_mm && std::abs(local.z) < 0.5 * body.height_mm)
+    return true;
   const ColumnDepth depth = depthIn(body, local);
   return depth.of_wall > -kSpur_mm && depth.of_plates > (depth.of_wall > kRim_mm ? -plate_mm : -kSpur_mm);
 }

@@ -118,25 +118,42 @@ class Seeds {
   Flood& flood_;
 };
 
-/// Where two vertebrae meet at their facets, some places are nearly always of one of them, in the lower one's frame:
-/// its superior processes end below 0.8 of its height over its middle; before that, what lies far behind the canal and
-/// near the midline hangs down from the upper one; what lies beside the pedicles is its own. A worn joint may show no
-/// space at all: there these places are dear to the other.
-void marshalFacets(const Block& block, const Body& lower, std::uint8_t lower_owner, std::uint8_t upper_owner,
-                   std::vector<std::uint8_t>& against) {
-  if (!lower.canal) return;
-  const Vec3 canal = lower.frame.toLocal(*lower.canal);
-  const double h = lower.height_mm, half = lower.half_width_mm;
+/// A place behind a body, in the body's own measures: aside of and behind the canal's middle in half widths, over the
+/// body's middle in heights.
+struct Behind {
+  double aside, back, over;
+};
+
+/// Where two vertebrae meet at their facets some places are nearly always of one of them. The lower one's superior
+/// processes end below 0.8 of its height; what lies before that behind the canal near the midline hangs down from the
+/// upper one, and the farther back, the wider it is; what lies beside the pedicles is its own.
+bool isUppersOverLower(const Behind& p) { return p.over > 0.8 || (p.over > 0.25 && p.back > 0.65 && p.aside < 0.5); }
+bool isLowersOverLower(const Behind& p) { return p.over < 0.5 && p.aside > 0.85; }
+
+/// The same as seen from the upper one: laminae and inferior processes hang behind its canal down to the next body's
+/// middle.
+bool isUppersUnderUpper(const Behind& p) { return p.over > -0.75 && p.over < -0.2 && p.back > 0.4 && p.aside < 0.7; }
+bool isLowersUnderUpper(const Behind& p) {
+  return p.over < -1.25 || (p.over < -0.4 && p.aside > 1.05) || (p.over < -0.5 && p.back < 0.1);
+}
+
+/// A worn joint may show no space at all: there places of one vertebra are dear to the other.
+void marshalFacets(const Block& block, const Body& body, bool is_lower, std::uint8_t lower_owner,
+                   std::uint8_t upper_owner, std::vector<std::uint8_t>& against) {
+  if (!body.canal) return;
+  const Vec3 canal = body.frame.toLocal(*body.canal);
+  const double h = body.height_mm, half = body.half_width_mm;
+  const auto lowers = is_lower ? isLowersOverLower : isLowersUnderUpper;
+  const auto uppers = is_lower ? isUppersOverLower : isUppersUnderUpper;
   std::size_t v = 0;
   for (int k = 0; k < block.dims[2]; ++k) {
     for (int j = 0; j < block.dims[1]; ++j) {
       for (int i = 0; i < block.dims[0]; ++i, ++v) {
-        const Vec3 p = lower.frame.toLocal(block.place(i, j, k));
-        if (p.z < 0 || p.z > 1.5 * h || p.y < lower.back_mm + 2) continue;
-        const double side = std::abs(p.x - canal.x);
-        const bool hanging = p.z > 0.25 * h && side < 0.5 * half && p.y > canal.y + 0.65 * half;
-        if (p.z > 0.8 * h || hanging) against[v] |= static_cast<std::uint8_t>(1U << lower_owner);
-        if (p.z < 0.5 * h && side > 0.85 * half) against[v] |= static_cast<std::uint8_t>(1U << upper_owner);
+        const Vec3 p = body.frame.toLocal(block.place(i, j, k));
+        if (p.y < body.back_mm + 2 || (is_lower ? p.z < 0 || p.z > 1.5 * h : p.z > 0 || p.z < -1.7 * h)) continue;
+        const Behind at{std::abs(p.x - canal.x) / half, (p.y - canal.y) / half, p.z / h};
+        if (uppers(at)) against[v] |= static_cast<std::uint8_t>(1U << lower_owner);
+        if (lowers(at)) against[v] |= static_cast<std::uint8_t>(1U << upper_owner);
       }
     }
   }
@@ -155,8 +172,12 @@ Ownership shareBone(const Scene& scene, const Spine& spine, double threshold_hu)
   const std::size_t voxels = hu.size();
   Flood flood{scene.block.dims, costs(scene, hu, threshold_hu), std::vector<std::uint8_t>(voxels, kNobody),
               std::vector<std::uint16_t>(voxels, 0), std::vector<std::uint8_t>(voxels, 0)};
-  marshalFacets(scene.block, spine.wanted, kWanted, kAbove, flood.against);
-  marshalFacets(scene.block, spine.below.body, kBelow, kWanted, flood.against);
+  marshalFacets(scene.block, spine.wanted, true, kWanted, kAbove, flood.against);
+  if (spine.below.found) {
+    marshalFacets(scene.block, spine.below.body, true, kBelow, kWanted, flood.against);
+  } else {  // a sacrum, or the end of the scan: a likeness says less of the joint than the wanted one itself
+    marshalFacets(scene.block, spine.wanted, false, kBelow, kWanted, flood.against);
+  }
   Seeds seeds(scene, hu, threshold_hu, flood);
   seeds.sowBody(spine.wanted, kWanted, false);
   seeds.sowBody(spine.above.body, kAbove, !spine.above.found);
