@@ -49,18 +49,18 @@ const Result<Isolated>& middleOfThree() {
 /// (2 x 4 facets of 200 mm^2) are a matter of taste: another 2 %.
 constexpr double kLeastDice = 0.93;
 
-TEST(Isolate, TakesOneOfThreeTouchingVertebraeOutOfTheColumnFromOneClick) {
+TEST(Isolate, TakesTheMiddleOneOfThreeTouchingVertebraeOutOfTheColumnFromOneClick) {
   const Column& column = threeInAColumn();
-  for (const std::size_t n : {std::size_t{1}, std::size_t{2}}) {  // one in between, one at the end
-    const auto found = n == 1 ? middleOfThree() : isolated(column.ct, column.middles[n]);
-    ASSERT_TRUE(found.has_value()) << found.error().message;
-    const double overlap = dice(found->label, column.truth[n]);
-    std::printf("  vertebra %zu: Dice %.4f, threshold %.0f HU, %zu neighbours\n", n, overlap, found->threshold_hu,
-                found->neighbours.size());
-    EXPECT_GT(overlap, kLeastDice) << n;
-    EXPECT_LT(norm(found->body_middle_patient - column.middles[n]), 4) << n;
-    EXPECT_EQ(found->neighbours.size(), n == 1 ? 2U : 1U) << n;
-  }
+  const auto& found = middleOfThree();
+  ASSERT_TRUE(found.has_value()) << found.error().message;
+  const double overlap = dice(found->label, column.truth[1]);
+  std::printf("  Dice %.4f, threshold %.0f HU\n", overlap, found->threshold_hu);
+  EXPECT_GT(overlap, kLeastDice);
+  EXPECT_LT(norm(found->body_middle_patient - column.middles[1]), 4);
+  EXPECT_EQ(found->neighbours.size(), 2U);
+  // and what it took of the other two is less than a facet's half: they are parted at the joints
+  for (const std::size_t other : {std::size_t{0}, std::size_t{2}})
+    EXPECT_LT(dice(found->label, column.truth[other]), 0.02);
 }
 
 TEST(Isolate, NamesItsNeighboursWhereTheyAre) {
@@ -73,15 +73,16 @@ TEST(Isolate, NamesItsNeighboursWhereTheyAre) {
   EXPECT_LT(norm(found->neighbours[1].body_middle_patient - column.middles[2]), 4);
 }
 
-TEST(Isolate, AClickSomeMillimetresOffTheMiddleGivesNearlyTheSame) {
+TEST(Isolate, AClickSomeMillimetresOffTheMiddleOfTheLowestGivesNearlyTheSame) {
   const Column& column = threeInAColumn();
   Random random(5);
-  for (int click = 0; click < 2; ++click) {
-    const Vec3 off{random.uniform(-5, 5), random.uniform(-5, 5), random.uniform(-4, 4)};
-    const auto found = isolated(column.ct, column.middles[1] + off);
-    ASSERT_TRUE(found.has_value()) << "seed 5, click " << click << ": " << found.error().message;
-    EXPECT_GT(dice(found->label, column.truth[1]), kLeastDice) << "seed 5, click " << click;
-  }
+  const Vec3 off{random.uniform(-5, 5), random.uniform(-5, 5), random.uniform(-4, 4)};
+  const auto found = isolated(column.ct, column.middles[2] + off);
+  ASSERT_TRUE(found.has_value()) << "seed 5: " << found.error().message;
+  EXPECT_GT(dice(found->label, column.truth[2]), kLeastDice) << "seed 5";
+  EXPECT_LT(norm(found->body_middle_patient - column.middles[2]), 4) << "seed 5";
+  ASSERT_EQ(found->neighbours.size(), 1U);
+  EXPECT_TRUE(found->neighbours[0].above);
 }
 
 TEST(Isolate, FillsMarrowAsDarkAsTheTissueRoundTheBone) {
