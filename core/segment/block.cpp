@@ -101,6 +101,19 @@ double trilinear(const float* values, const std::array<int, 3>& dims, const Vec3
   return near + z.part * (plane(p + z.step) - near);
 }
 
+/// The box along the patient's axes that holds the whole CT, from the seed.
+void reachOf(const Grid& grid, const Vec3& seed, Vec3& least, Vec3& most) {
+  least = Vec3{1, 1, 1} * 1e300, most = -least;
+  const Vec3 at = grid.toVoxel(seed), s = grid.spacing_mm;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 v{(corner & 1) != 0 ? grid.dims[0] - 0.5 : -0.5, (corner & 2) != 0 ? grid.dims[1] - 0.5 : -0.5,
+                 (corner & 4) != 0 ? grid.dims[2] - 0.5 : -0.5};
+    const Vec3 p = grid.direction * Vec3{(v.x - at.x) * s.x, (v.y - at.y) * s.y, (v.z - at.z) * s.z};
+    least = {std::min(least.x, p.x), std::min(least.y, p.y), std::min(least.z, p.z)};
+    most = {std::max(most.x, p.x), std::max(most.y, p.y), std::max(most.z, p.z)};
+  }
+}
+
 }  // namespace
 
 double valueAt(const Block& block, const std::vector<float>& values, const Vec3& place_mm) {
@@ -124,9 +137,14 @@ Block blockAround(const CtVolume& ct, const Vec3& seed_patient, const Vec3& low_
   averageInto(part, ct, threads);
   Block block;
   block.step_mm = step_mm;
+  Vec3 least, most;
+  reachOf(ct.grid, seed_patient, least, most);
   for (std::size_t a = 0; a < 3; ++a) {
-    const int below = static_cast<int>(std::ceil(-axisOf(low_mm, a) / step_mm));  // the seed is a voxel's centre
-    block.dims[a] = below + static_cast<int>(std::ceil(axisOf(high_mm, a) / step_mm)) + 1;
+    // the seed is a voxel's centre; one voxel beyond the CT's end
+    const double low = std::max(axisOf(low_mm, a), axisOf(least, a)),
+                 high = std::min(axisOf(high_mm, a), axisOf(most, a));
+    const int below = static_cast<int>(std::ceil(std::max(0.0, -low) / step_mm));
+    block.dims[a] = below + static_cast<int>(std::ceil(std::max(0.0, high) / step_mm)) + 1;
     axisOf(block.low_mm, a) = -below * step_mm;
   }
   block.hu.resize(static_cast<std::size_t>(block.dims[0]) * static_cast<std::size_t>(block.dims[1]) *
