@@ -20,7 +20,7 @@ constexpr std::uint64_t kSeed = 1;
 ///   there, and the flood meets elsewhere (of L4's 4,500 missed voxels 2,600 go to its neighbours).
 /// - its L5 besides: the sacrum is not found as a rival, so a likeness of L5 stands for it.
 /// - tptbox L3: voxels of 1.5 mm; where the label draws the surface moves by half a voxel from place to place, which no
-///   one threshold follows (2,100 voxels too many and 1,000 too few; a threshold 30 HU higher: 1,800 and 1,600).
+///   one threshold follows (2,100 voxels too many and 1,000 too few; with one of 160 HU: 1,800 and 1,600).
 struct Level {
   const char* name;
   double median, worst;
