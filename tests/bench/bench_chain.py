@@ -92,7 +92,8 @@ for number, value in ((1, 20), (2, 21), (4, 23), (5, 24)):
 def moved_paths(program, store, case):
     """L3_PATHS, moved by as much as this mesh's middle lies from that one's."""
     with tempfile.NamedTemporaryFile(suffix=".stl") as mesh:
-        subprocess.run([program, "export", case, "--out", mesh.name, "--data", store, "--json"], capture_output=True, check=True)
+        subprocess.run([program, "export", case, "--format", "stl", "--out", mesh.name, "--data", store], capture_output=True,
+                       check=True)
         data = pathlib.Path(mesh.name).read_bytes()
     triangles = [struct.unpack_from("<9f", data, 84 + 50 * n + 12) for n in range((len(data) - 84) // 50)]
     middle = [sum(t[a] + t[a + 3] + t[a + 6] for t in triangles) / (3 * len(triangles)) for a in range(3)]
