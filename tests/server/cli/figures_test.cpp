@@ -147,6 +147,19 @@ TEST_F(Figures, OfAnUnsegmentedCaseSayWhatComesFirst) {
             "spinaltap: case " + id + " is not reconstructed yet\n");
 }
 
+TEST_F(Figures, OfATradeoffAreRowsAndPictures) {
+  const Json figures = json({"tradeoff", "--surface", "--reduce", "4", "--method", "normal", "--smoothing", "0",
+                             "--sample-spacing", "2", "--out", path("pictures")},
+                            "tradeoff");
+  ASSERT_EQ(figures["rows"].size(), 1U);
+  expectDocumented("tradeoff, a row", figures["rows"][0]);
+  EXPECT_EQ(figures["rows"][0]["method"], "normal");
+  EXPECT_EQ(figures["files"].size(), 5U);
+  for (const auto& file : figures["files"]) {
+    EXPECT_GT(std::filesystem::file_size(path("pictures/" + file.get<std::string>())), 500U) << file;
+  }
+}
+
 TEST_F(Figures, AreALineEachWithoutJson) {
   const auto finished = run({"version"});
   EXPECT_EQ(finished.out.rfind("version  ", 0), 0u) << finished.out;

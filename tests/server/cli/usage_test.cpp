@@ -10,8 +10,8 @@
 namespace spinaltap::test {
 namespace {
 
-const std::vector<std::string> kCommands{"phantom", "import", "segment", "reconstruct", "plan",  "drill",
-                                         "replay",  "serve",  "cases",   "version",     "export"};
+const std::vector<std::string> kCommands{"phantom", "import", "segment", "reconstruct", "plan",   "drill",
+                                         "replay",  "serve",  "cases",   "version",     "export", "tradeoff"};
 
 void expectOneLine(const Finished& finished, int code) {
   EXPECT_EQ(finished.code, code) << finished.err;
@@ -60,6 +60,10 @@ TEST(Usage, WrongUsageEndsWithTwoAndOneLine) {
            {"drill", "--volume", "report", "--scene", "on", "--engine", "steam"},
            {"drill", "--volume", "report", "--scene", "on", "--cycles", "-1"},
            {"replay"},
+           {"tradeoff"},
+           {"tradeoff", "--surface", "--method", "voxel"},
+           {"tradeoff", "c7", "--surface", "--reduce", "2"},
+           {"reconstruct", "c7", "--method", "voxel"},
            {"serve", "--port", "http"}}) {
     std::string shown;
     for (const auto& word : wrong) shown += word + " ";
