@@ -88,32 +88,40 @@ void Chebyshev::spreadGradient(const double* values, const double middle[3], dou
   spreadGradients(cubeOf(p_, basis_, middle, half), rows.data(), points, x, y, z);
 }
 
-Transfer::Transfer(const Chebyshev& parent, const Chebyshev& child)
-    : parent_(static_cast<std::size_t>(parent.nodes())), child_(static_cast<std::size_t>(child.nodes())) {
-  const std::size_t stride = strideOf(parent.nodes());
+Transfer::Transfer(const Chebyshev& coarse, const Chebyshev& fine, const std::array<Place, 2>& places)
+    : coarse_(static_cast<std::size_t>(coarse.nodes())), fine_(static_cast<std::size_t>(fine.nodes())) {
+  const std::size_t stride = strideOf(coarse.nodes());
   for (std::size_t side = 0; side < 2; ++side) {
-    up_[side].assign(parent_ * child_, 0.0), down_[side].assign(parent_ * child_, 0.0);
-    for (std::size_t b = 0; b < child_; ++b) {
-      const double t = 0.5 * (child.root(static_cast<int>(b)) + (side == 0 ? -1.0 : 1.0));
+    up_[side].assign(coarse_ * fine_, 0.0), down_[side].assign(coarse_ * fine_, 0.0);
+    for (std::size_t b = 0; b < fine_; ++b) {
+      const double t = places[side].middle + places[side].half * fine.root(static_cast<int>(b));
       double before = t, value = 1;  // T_-1 = T_1
-      for (std::size_t k = 0; k < parent_; ++k) {
-        for (std::size_t a = 0; a < parent_; ++a) up_[side][a * child_ + b] += parent.basis_[k * stride + a] * value;
+      for (std::size_t k = 0; k < coarse_; ++k) {
+        for (std::size_t a = 0; a < coarse_; ++a) up_[side][a * fine_ + b] += coarse.basis_[k * stride + a] * value;
         const double next = 2 * t * value - before;
         before = value, value = next;
       }
-      for (std::size_t a = 0; a < parent_; ++a) down_[side][b * parent_ + a] = up_[side][a * child_ + b];
+      for (std::size_t a = 0; a < coarse_; ++a) down_[side][b * coarse_ + a] = up_[side][a * fine_ + b];
     }
   }
 }
 
-void Transfer::toParent(int octant, const double* child, double* parent) const {
-  const std::vector<double>* const m[3] = {&up_[octant & 1], &up_[octant >> 1 & 1], &up_[octant >> 2 & 1]};
-  applyToAxes(m, parent_, child_, child, parent);
+Transfer Transfer::toOctants(const Chebyshev& parent, const Chebyshev& child) {
+  return {parent, child, {Place{-0.5, 0.5}, Place{0.5, 0.5}}};
 }
 
-void Transfer::toChild(int octant, const double* parent, double* child) const {
+Transfer Transfer::within(const Chebyshev& coarse, const Chebyshev& fine) {
+  return {coarse, fine, {Place{0, 1}, Place{0, 1}}};
+}
+
+void Transfer::toCoarse(int octant, const double* fine, double* coarse) const {
+  const std::vector<double>* const m[3] = {&up_[octant & 1], &up_[octant >> 1 & 1], &up_[octant >> 2 & 1]};
+  applyToAxes(m, coarse_, fine_, fine, coarse);
+}
+
+void Transfer::toFine(int octant, const double* coarse, double* fine) const {
   const std::vector<double>* const m[3] = {&down_[octant & 1], &down_[octant >> 1 & 1], &down_[octant >> 2 & 1]};
-  applyToAxes(m, child_, parent_, parent, child);
+  applyToAxes(m, fine_, coarse_, coarse, fine);
 }
 
 }  // namespace spinaltap::rbf

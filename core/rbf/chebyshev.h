@@ -1,6 +1,7 @@
 // core/rbf/chebyshev.h - functions on a cube by their values at p^3 Chebyshev nodes (internal).
 // After: Fong and Darve, "The black-box fast multipole method", J. Comput. Phys. 228 (2009).
 #pragma once
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -18,9 +19,9 @@ class Chebyshev {
   explicit Chebyshev(int nodes);
 
   [[nodiscard]] int nodes() const { return p_; }
-  /// Length of a cube's values, and that rounded up to a multiple of 8, which is how they are stored.
+  /// Length of a cube's values, and that rounded up to a multiple of 16, which is how they are stored.
   [[nodiscard]] std::size_t values() const { return static_cast<std::size_t>(p_) * p_ * p_; }
-  [[nodiscard]] std::size_t stored() const { return (values() + 7) / 8 * 8; }
+  [[nodiscard]] std::size_t stored() const { return (values() + 15) / 16 * 16; }
   [[nodiscard]] double root(int a) const { return roots_[static_cast<std::size_t>(a)]; }
 
   /// values[n] += sum_j w_j S_n(x_j): what the points weigh at the nodes.
@@ -39,19 +40,25 @@ class Chebyshev {
   friend class Transfer;
 };
 
-/// Between a cube and its children, which may have another number of nodes.
+/// Between a cube's values and those of its octants, or of itself, told by another number of nodes.
 class Transfer {
  public:
-  Transfer(const Chebyshev& parent, const Chebyshev& child);
+  [[nodiscard]] static Transfer toOctants(const Chebyshev& parent, const Chebyshev& child);
+  [[nodiscard]] static Transfer within(const Chebyshev& coarse, const Chebyshev& fine);
 
-  /// parent += what a child's weights are at the parent's nodes; the child is the octant (bits x, y, z).
-  void toParent(int octant, const double* child, double* parent) const;
-  /// child += the parent's interpolant at the child's nodes.
-  void toChild(int octant, const double* parent, double* child) const;
+  /// coarse += what the fine nodes' weights are at the coarse ones; fine is the octant (bits x, y, z).
+  void toCoarse(int octant, const double* fine, double* coarse) const;
+  /// fine += the coarse interpolant at the fine nodes.
+  void toFine(int octant, const double* coarse, double* fine) const;
 
  private:
-  std::size_t parent_, child_;   ///< nodes an axis
-  std::vector<double> up_[2];    ///< parent x child: S_a(root b seen from the parent), for the lower and upper half
+  struct Place {
+    double middle, half;  ///< of the fine cube along an axis of the coarse one, which is -1 .. 1
+  };
+  Transfer(const Chebyshev& coarse, const Chebyshev& fine, const std::array<Place, 2>& places);
+
+  std::size_t coarse_, fine_;    ///< nodes an axis
+  std::vector<double> up_[2];    ///< coarse x fine: S_a(root b seen from the coarse cube), for each of the two places
   std::vector<double> down_[2];  ///< the same turned over
 };
 

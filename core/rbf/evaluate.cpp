@@ -12,11 +12,12 @@
 namespace spinaltap::rbf {
 namespace {
 
-constexpr std::size_t kBlock = 64;                 // points that one thread takes at a time
-constexpr std::size_t kWorthAThread = 200'000;     // pairs
-constexpr std::size_t kWorthFastSums = 4'000'000;  // pairs: below, planning costs more than it saves
-constexpr double kFarRadii = 4;                    // farther points are summed directly
-constexpr std::size_t kTried = 256;                // places at which an order is tried out
+constexpr std::size_t kBlock = 64;                   // points that one thread takes at a time
+constexpr std::size_t kWorthAThread = 200'000;       // pairs
+constexpr std::size_t kWorthFastSums = 4'000'000;    // pairs: below, planning costs more than it saves
+constexpr double kFarRadii = 4;                      // farther points are summed directly
+constexpr std::size_t kFewCentres = 250;             // sums of fewer are always direct
+constexpr std::size_t kCrowds = 24, kInACrowd = 12;  // places at which sums are tried out
 
 unsigned usefulThreads(const Model& model, std::size_t points, unsigned threads) {
   return std::uint64_t{points} * (model.centres.size() + 1) < kWorthAThread ? 1 : threads;
@@ -91,13 +92,44 @@ std::vector<std::size_t> others(std::size_t count, const std::vector<std::size_t
   return out;
 }
 
-FastSumOptions optionsOf(int nodes, bool single_near, unsigned threads, std::size_t points) {
+FastSumOptions optionsOf(const Model& m, double tolerance, double error, unsigned threads, std::size_t points) {
   FastSumOptions o;
-  o.nodes = nodes, o.single_near = single_near, o.threads = threads;
+  o.weights = m.weights, o.error = error, o.near_error = 0.1 * tolerance, o.threads = threads;
   // Measured: few points are best served by small cubes, a million by near sums over large ones.
   o.leaf_size = points > 200'000 ? 240 : 120;
   o.target_leaf_size = points > 200'000 ? 1000 : 120;
   return o;
+}
+
+/// Where sums are likely to be worst: crowds of places around the centres of the largest weights, apart from each
+/// other, and for the rest around every n-th centre and anywhere in the ball.
+std::vector<Vec3> trialPlaces(const Model& m) {
+  const std::size_t n = m.centres.size();
+  std::vector<std::size_t> by_weight(n);
+  for (std::size_t i = 0; i < n; ++i) by_weight[i] = i;
+  std::sort(by_weight.begin(), by_weight.end(), [&](std::size_t a, std::size_t b) {
+    const double wa = std::abs(m.weights[a]), wb = std::abs(m.weights[b]);
+    return wa != wb ? wa > wb : a < b;
+  });
+  const double apart = 0.1 * m.radius_mm;
+  std::vector<Vec3> crowds;
+  for (std::size_t k = 0; k < n && crowds.size() < kCrowds / 2; ++k) {
+    const Vec3& c = m.centres[by_weight[k]];
+    if (std::all_of(crowds.begin(), crowds.end(), [&](const Vec3& other) { return norm(other - c) > apart; }))
+      crowds.push_back(c);
+  }
+  Random random(n);
+  while (crowds.size() < kCrowds) {
+    const Vec3 anywhere = Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * m.radius_mm;
+    crowds.push_back(crowds.size() % 2 == 0 ? m.centres[crowds.size() * n / kCrowds] : anywhere);
+  }
+  std::vector<Vec3> places;
+  for (const Vec3& crowd : crowds) {
+    for (std::size_t k = 0; k < kInACrowd; ++k)
+      places.push_back(crowd +
+                       Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * (0.3 * apart));
+  }
+  return places;
 }
 
 }  // namespace
@@ -121,53 +153,36 @@ void evaluateGradient(const Model& model, std::span<const Vec3> points, std::spa
   }
 }
 
-Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads) : model_(std::move(model)), threads_(threads) {
+Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads)
+    : model_(std::move(model)), tolerance_(tolerance_mm), threads_(threads) {
   assert(tolerance_mm > 0);
-  const std::size_t n = model_.centres.size();
-  if (n * kTried < 64'000) return;
-  // Half beside centres, where near pairs weigh most, half all over the ball, where the largest cubes' errors show; a
-  // third of the tolerance there leaves room for places not tried.
-  Random random(n);
-  std::vector<Vec3> places;
-  for (std::size_t k = 0; k < kTried; ++k) {
-    const Vec3 away{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
-    places.push_back(k % 2 == 0 ? model_.centres[k * n / kTried] + away * (0.02 * model_.radius_mm)
-                                : away * model_.radius_mm);
-  }
+  if (model_.centres.size() < kFewCentres) return;
+  const std::vector<Vec3> places = trialPlaces(model_);
   const Coordinates at(places), centres(model_.centres);
-  std::vector<double> direct(kTried), fast(kTried);
+  std::vector<double> direct(places.size()), fast(places.size());
   directSums(model_, centres, at, direct, threads_);
-  const auto error = [&](int nodes, bool single_near) {
-    FastSumOptions options = optionsOf(nodes, single_near, threads_, 0);
+  // A third of the tolerance leaves room for places not tried.
+  for (double error = 0.1 * tolerance_mm; error > 1e-4 * tolerance_mm; error *= 0.25) {
+    FastSumOptions options = optionsOf(model_, tolerance_, error, threads_, 0);
     options.target_leaf_size = 2;  // cubes as small as those of many points
     FastSum(model_.centres, places, options).values(model_.weights, fast);
     double most = 0;
-    for (std::size_t k = 0; k < kTried; ++k) most = std::max(most, std::abs(fast[k] - direct[k]));
-    return most;
-  };
-  const double wanted = tolerance_mm / 3;
-  for (int nodes = 6; nodes <= Chebyshev::kMost;) {
-    const double most = error(nodes, true);
-    if (most <= wanted || (most <= 4 * wanted && error(nodes, false) <= wanted)) {
-      nodes_ = nodes, single_near_ = most <= wanted;
-      return;
-    }
-    // Each node an axis gains a factor of about six. What single precision cannot reach, the last order tries in
-    // double.
-    const int more = std::max(1, static_cast<int>(std::log(most / wanted) / std::log(6.0)));
-    nodes = nodes < Chebyshev::kMost ? std::min(nodes + more, Chebyshev::kMost) : nodes + 1;
+    for (std::size_t k = 0; k < places.size(); ++k) most = std::max(most, std::abs(fast[k] - direct[k]));
+    if (!(most <= 0.3 * tolerance_mm)) continue;
+    error_ = error;
+    return;
   }
-  if (error(Chebyshev::kMost, false) <= wanted) nodes_ = Chebyshev::kMost;
 }
 
 void Evaluator::values(std::span<const Vec3> points, std::span<double> out) const {
-  if (nodes_ == 0 || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
+  if (error_ == 0 || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
     return evaluate(model_, points, out, threads_);
   const std::vector<std::size_t> near = nearPoints(model_, points);
   if (!near.empty()) {
     const std::vector<Vec3> at = relative(model_, points, near);
     std::vector<double> sums(at.size());
-    FastSum(model_.centres, at, optionsOf(nodes_, single_near_, threads_, at.size())).values(model_.weights, sums);
+    FastSum(model_.centres, at, optionsOf(model_, tolerance_, error_, threads_, at.size()))
+        .values(model_.weights, sums);
     for (std::size_t n = 0; n < near.size(); ++n) out[near[n]] = finished(model_, at[n], sums[n]);
   }
   const std::vector<std::size_t> far = others(points.size(), near);
@@ -178,13 +193,13 @@ void Evaluator::values(std::span<const Vec3> points, std::span<double> out) cons
 }
 
 void Evaluator::gradients(std::span<const Vec3> points, std::span<Vec3> out) const {
-  if (nodes_ == 0 || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
+  if (error_ == 0 || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
     return evaluateGradient(model_, points, out, threads_);
   const std::vector<std::size_t> near = nearPoints(model_, points);
   if (!near.empty()) {
     const std::vector<Vec3> at = relative(model_, points, near);
     std::vector<Vec3> slopes(at.size());
-    const FastSum sum(model_.centres, at, optionsOf(nodes_, single_near_, threads_, at.size()));
+    const FastSum sum(model_.centres, at, optionsOf(model_, tolerance_, error_, threads_, at.size()));
     sum.gradients(model_.weights, slopes);
     for (std::size_t n = 0; n < near.size(); ++n) out[near[n]] = slopes[n] + model_.linear;
     pointAwayBeyond(at, near, points, out);

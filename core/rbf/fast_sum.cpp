@@ -2,86 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "core/base/parallel.h"
-#include "core/rbf/simd_dense.h"
 
 namespace spinaltap::rbf {
 namespace {
 
-// Target nodes that one thread takes at a time.
-constexpr std::size_t kGroup = 192;
-constexpr std::size_t kColumns = 64;  // far pairs multiplied at a time
-
-/// Distances between cubes, sorted downwards, are (2, 0, 0) .. (3, 3, 3).
-int kindOf(int a, int b, int c) { return (a == 2 ? 0 : 6) + b * (b + 1) / 2 + c; }
-
-constexpr std::array<std::array<int, 3>, 6> kOrders{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
-
-struct Turn {
-  std::uint8_t kind, turn;
-};
-
-/// The symmetry of the cube that turns an offset into its sorted, positive form.
-Turn turnOf(const std::array<int, 3>& offset) {
-  const std::array<int, 3> size{std::abs(offset[0]), std::abs(offset[1]), std::abs(offset[2])};
-  for (std::size_t order = 0; order < 6; ++order) {
-    const auto axis = [&](std::size_t n) { return static_cast<std::size_t>(kOrders[order][n]); };
-    if (size[axis(0)] < size[axis(1)] || size[axis(1)] < size[axis(2)]) continue;
-    int signs = 0;
-    for (std::size_t n = 0; n < 3; ++n) signs |= offset[axis(n)] < 0 ? 1 << n : 0;
-    return {static_cast<std::uint8_t>(kindOf(size[axis(0)], size[axis(1)], size[axis(2)])),
-            static_cast<std::uint8_t>(order * 8 + static_cast<std::size_t>(signs))};
-  }
-  return {0, 0};
-}
-
-std::vector<std::uint16_t> turnedNodes(int p, std::size_t turn) {
-  std::vector<std::uint16_t> out;
-  for (int a = 0; a < p; ++a) {
-    for (int b = 0; b < p; ++b) {
-      for (int c = 0; c < p; ++c) {
-        const std::array<int, 3> at{a, b, c};
-        int index = 0;
-        for (std::size_t n = 0; n < 3; ++n) {
-          const int along = at[static_cast<std::size_t>(kOrders[turn / 8][n])];
-          index = index * p + ((turn % 8 >> n & 1) != 0 ? p - 1 - along : along);
-        }
-        out.push_back(static_cast<std::uint16_t>(index));
-      }
-    }
-  }
-  return out;
-}
-
-/// Distances from the nodes of a source cube `offset` cubes away to those of the target cube, both of half side 1.
-std::vector<double> farMatrix(const Chebyshev& c, int a, int b, int e) {
-  const int p = c.nodes();
-  std::vector<double> m(c.stored() * c.values(), 0.0);
-  const auto square = [&](int offset, int source, int target) {
-    const double d = 2.0 * offset + c.root(source) - c.root(target);
-    return d * d;
-  };
-  std::size_t column = 0;
-  for (int s0 = 0; s0 < p; ++s0)
-    for (int s1 = 0; s1 < p; ++s1)
-      for (int s2 = 0; s2 < p; ++s2, ++column) {
-        double* to = m.data() + column * c.stored();
-        for (int t0 = 0; t0 < p; ++t0)
-          for (int t1 = 0; t1 < p; ++t1)
-            for (int t2 = 0; t2 < p; ++t2) *to++ = std::sqrt(square(a, s0, t0) + square(b, s1, t1) + square(e, s2, t2));
-      }
-  return m;
-}
-
-std::vector<std::vector<double>> farMatrices(const Chebyshev& c) {
-  std::vector<std::vector<double>> out;
-  for (int a = 2; a <= 3; ++a)
-    for (int b = 0; b <= a; ++b)
-      for (int e = 0; e <= b; ++e) out.push_back(farMatrix(c, a, b, e));
-  return out;
-}
+constexpr std::size_t kColumns = 64;      // far pairs multiplied at a time
+constexpr int kFewestByRule = 4;          // nodes an axis of the smallest cubes, unless weights say otherwise
+constexpr std::size_t kPairOfNodes = 10;  // a near pair of points costs so many products of a far pair
 
 /// Points gathered from several places, relative to a middle.
 template <class T>
@@ -94,6 +23,12 @@ struct Gathered {
       x.push_back(static_cast<T>(p.x[n] - middle.x)), y.push_back(static_cast<T>(p.y[n] - middle.y));
       z.push_back(static_cast<T>(p.z[n] - middle.z));
       if (weights != nullptr) w.push_back(static_cast<T>(weights[n]));
+    }
+  }
+  void addAll(const Gathered<double>& from) {
+    for (std::size_t n = 0; n < from.x.size(); ++n) {
+      x.push_back(static_cast<T>(from.x[n])), y.push_back(static_cast<T>(from.y[n]));
+      z.push_back(static_cast<T>(from.z[n])), w.push_back(static_cast<T>(from.w[n]));
     }
   }
   [[nodiscard]] PointArrays<T> points() const { return {x.data(), y.data(), z.data(), x.size()}; }
@@ -122,140 +57,19 @@ std::vector<double> sorted(const Octree& tree, std::span<const double> values) {
   return out;
 }
 
-}  // namespace
-
-/// Walks both trees from their roots and decides, pair by pair, how one cube's points reach another's.
-class FastSum::Listing {
- public:
-  explicit Listing(FastSum& sum)
-      : sum_(sum),
-        targets_(sum.targets_->nodes()),
-        sources_(sum.sources_->nodes()),
-        few_(sum.orders_.back()->chebyshev.values()) {
-    // A pair of far cubes costs a product of p^3 by p^3; this many pairs of points cost about as much.
-    direct_ = few_ * few_ / (sum.options_.single_near ? 8 : 20);
-    equal(0, 0);
-    sum.near_ = listsOf(near_);
-    sum.from_nodes_ = listsOf(from_nodes_);
-    sum.to_nodes_ = listsOf(to_nodes_);
-    groupFar();
+/// Of single precision: how far the sum of these points, seen from up to `half` along each axis, may be off. Roundings
+/// of the pairs are independent; six of their standard deviations.
+double singleError(const Gathered<double>& near, double half) {
+  constexpr double kRounding = 6e-8;
+  double squares = 0;
+  for (std::size_t n = 0; n < near.x.size(); ++n) {
+    const double reach = half * 1.75 + std::sqrt(near.x[n] * near.x[n] + near.y[n] * near.y[n] + near.z[n] * near.z[n]);
+    squares += near.w[n] * near.w[n] * reach * reach;
   }
-
- private:
-  using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
-
-  /// Two cubes of one level.
-  void equal(std::uint32_t t, std::uint32_t s) {
-    const OctreeNode &target = targets_[t], &source = sources_[s];
-    std::array<int, 3> offset{};
-    bool apart = false;
-    for (std::size_t n = 0; n < 3; ++n) {
-      offset[n] = source.at[n] - target.at[n];
-      apart = apart || std::abs(offset[n]) > 1;
-    }
-    if (apart) {
-      const std::size_t pairs = std::size_t{target.count} * source.count;
-      if (target.leaf() && source.leaf() && pairs < direct_) {
-        near_.emplace_back(t, s);
-      } else {
-        const Turn turn = turnOf(offset);
-        sum_.far_.push_back({t, s, turn.kind, turn.turn});
-      }
-    } else if (target.leaf() && source.leaf()) {
-      near_.emplace_back(t, s);
-    } else if (target.leaf()) {
-      eachChild(source, [&](std::uint32_t c) { smallerSource(t, c); });
-    } else if (source.leaf()) {
-      eachChild(target, [&](std::uint32_t c) { smallerTarget(c, s); });
-    } else {
-      eachChild(target, [&](std::uint32_t ct) { eachChild(source, [&](std::uint32_t cs) { equal(ct, cs); }); });
-    }
-  }
-
-  void smallerSource(std::uint32_t t, std::uint32_t s) {
-    const OctreeNode& source = sources_[s];
-    if (touch(targets_[t], source)) {
-      if (source.leaf()) {
-        near_.emplace_back(t, s);
-      } else {
-        eachChild(source, [&](std::uint32_t c) { smallerSource(t, c); });
-      }
-    } else if (source.count <= few_) {
-      allLeaves(source, s, [&](std::uint32_t leaf) { near_.emplace_back(t, leaf); }, sources_);
-    } else {
-      from_nodes_.emplace_back(t, s);
-    }
-  }
-
-  void smallerTarget(std::uint32_t t, std::uint32_t s) {
-    const OctreeNode& target = targets_[t];
-    if (touch(sources_[s], target)) {
-      if (target.leaf()) {
-        near_.emplace_back(t, s);
-      } else {
-        eachChild(target, [&](std::uint32_t c) { smallerTarget(c, s); });
-      }
-    } else if (target.count <= few_) {
-      allLeaves(target, t, [&](std::uint32_t leaf) { near_.emplace_back(leaf, s); }, targets_);
-    } else {
-      to_nodes_.emplace_back(t, s);
-    }
-  }
-
-  template <class Use>
-  static void eachChild(const OctreeNode& node, const Use& use) {
-    for (std::int32_t n = 0; n < node.child_count; ++n) use(static_cast<std::uint32_t>(node.children + n));
-  }
-
-  template <class Use>
-  void allLeaves(const OctreeNode& node, std::uint32_t index, const Use& use, const std::vector<OctreeNode>& nodes) {
-    if (node.leaf()) return use(index);
-    eachChild(node, [&](std::uint32_t c) { allLeaves(nodes[c], c, use, nodes); });
-  }
-
-  /// Whether a smaller cube touches a larger one.
-  static bool touch(const OctreeNode& large, const OctreeNode& small) {
-    const int levels = small.level - large.level;
-    for (std::size_t n = 0; n < 3; ++n) {
-      const std::int64_t low = std::int64_t{large.at[n]} << levels, high = (std::int64_t{large.at[n]} + 1) << levels;
-      if (small.at[n] + 1 < low || small.at[n] > high) return false;
-    }
-    return true;
-  }
-
-  [[nodiscard]] Lists listsOf(Pairs& pairs) const {
-    std::stable_sort(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    Lists out;
-    out.first.assign(targets_.size() + 1, 0);
-    for (const auto& [t, s] : pairs) {
-      ++out.first[t + 1];
-      out.source.push_back(s);
-    }
-    for (std::size_t n = 1; n < out.first.size(); ++n) out.first[n] += out.first[n - 1];
-    return out;
-  }
-
-  void groupFar() {
-    const auto group = [](const FarPair& f) { return f.target / kGroup; };
-    std::stable_sort(sum_.far_.begin(), sum_.far_.end(), [&](const FarPair& a, const FarPair& b) {
-      if (group(a) != group(b)) return group(a) < group(b);
-      const int level_a = targets_[a.target].level, level_b = targets_[b.target].level;
-      return level_a != level_b ? level_a < level_b : a.kind < b.kind;
-    });
-    sum_.far_first_.assign(targets_.size() / kGroup + 2, 0);
-    for (const FarPair& f : sum_.far_) ++sum_.far_first_[group(f) + 1];
-    for (std::size_t n = 1; n < sum_.far_first_.size(); ++n) sum_.far_first_[n] += sum_.far_first_[n - 1];
-  }
-
-  FastSum& sum_;
-  const std::vector<OctreeNode>&targets_, &sources_;
-  std::size_t few_, direct_;
-  Pairs near_, from_nodes_, to_nodes_;
-};
-
-FastSum::Order::Order(int nodes) : chebyshev(nodes), matrices(farMatrices(chebyshev)) {
-  for (std::size_t turn = 0; turn < turns.size(); ++turn) turns[turn] = turnedNodes(nodes, turn);
+  return 6 * kRounding * std::sqrt(squares);
 }
+
+}  // namespace
 
 FastSum::FastSum(std::span<const Vec3> sources, std::span<const Vec3> targets, const FastSumOptions& options)
     : options_(options) {
@@ -265,87 +79,157 @@ FastSum::FastSum(std::span<const Vec3> sources, std::span<const Vec3> targets, c
   // Where no source is near, a target's cube need not be small; deeper than the sources' leaves brings nothing.
   targets_ =
       same ? sources_ : std::make_shared<const Octree>(targets, root, options.target_leaf_size, sources_->depth());
-  makeOrders();
+  const std::vector<int> nodes = nodesOfLevels(std::max(sources_->depth(), targets_->depth()) + 1);
+  const std::size_t few = static_cast<std::size_t>(nodes.back()) * static_cast<std::size_t>(nodes.back()) *
+                          static_cast<std::size_t>(nodes.back());
+  seen_ = interactionsOf(*targets_, *sources_, few, few * few / kPairOfNodes);
+  makeLevels(nodes);
   up_first_ = offsetsOf(*sources_), down_first_ = offsetsOf(*targets_);
-  Listing listing(*this);
+  options_.weights = {};
 }
 
-void FastSum::makeOrders() {
-  // No cube is far from another above level 2.
-  constexpr int kFewestNodes = 4, kFirstFar = 2;
-  const int levels = std::max(sources_->depth(), targets_->depth()) + 1;
+std::vector<int> FastSum::nodesOfLevels(int levels) const {
+  std::vector<int> out;
+  for (int level = 0; level < levels; ++level)
+    out.push_back(std::max(std::min(kFewestByRule, options_.nodes), options_.nodes - std::max(0, level - kFirstFar)));
+  if (options_.weights.empty()) return out;
+  // A pair of cubes is wrong by farError of half the cube's side and the root of the sum of the weights' squares, since
+  // the errors of a cube's points are as often positive as negative; the heaviest cube of each level decides. Three
+  // times that for the pairs that a cube is in, and the corners.
+  std::vector<double> heaviest(static_cast<std::size_t>(levels), 0.0);
+  const std::vector<double> w = sorted(*sources_, options_.weights);
+  for (const OctreeNode& node : sources_->nodes()) {
+    double squares = 0;
+    for (std::size_t n = node.first; n < node.first + node.count; ++n) squares += w[n] * w[n];
+    double& most = heaviest[static_cast<std::size_t>(node.level)];
+    most = std::max(most, squares);
+  }
+  const double share = options_.error / std::sqrt(std::max(1, levels - kFirstFar));
   for (int level = 0; level < levels; ++level) {
-    const int nodes = std::max(std::min(kFewestNodes, options_.nodes), options_.nodes - std::max(0, level - kFirstFar));
-    if (orders_.empty() || orders_.back()->chebyshev.nodes() != nodes) {
-      orders_.push_back(std::make_shared<const Order>(nodes));
-    } else {
-      orders_.push_back(orders_.back());
+    const double weight =
+        3 * sources_->halfOf(level) * std::sqrt(heaviest[static_cast<std::size_t>(std::max(level, kFirstFar))]);
+    int& nodes = out[static_cast<std::size_t>(level)];
+    nodes = Chebyshev::kFewest;
+    while (nodes < Chebyshev::kMost && farError(nodes) * weight > share) ++nodes;
+  }
+  return out;
+}
+
+void FastSum::makeLevels(const std::vector<int>& nodes) {
+  std::array<std::shared_ptr<FarOrder>, Chebyshev::kMost + 1> orders;
+  const auto orderOf = [&](int n) -> const std::shared_ptr<FarOrder>& {
+    std::shared_ptr<FarOrder>& order = orders[static_cast<std::size_t>(n)];
+    if (order == nullptr) order = std::make_shared<FarOrder>(n);
+    return order;
+  };
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    Level& level = levels_.emplace_back();
+    level.nodes = nodes[n], level.first = {0};
+    for (int part = nodes[n]; part >= nodesFor(FarKind::kCount - 1, nodes[n]); --part) {
+      level.orders.push_back(orderOf(part));
+      level.first.push_back(level.first.back() + orderOf(part)->chebyshev().stored());
+      if (part < nodes[n])
+        level.narrower.push_back(Transfer::within(orderOf(part)->chebyshev(), orderOf(part + 1)->chebyshev()));
     }
-    transfers_.push_back(
-        level == 0 ? nullptr
-                   : std::make_shared<const Transfer>(orderOf(level - 1).chebyshev, orderOf(level).chebyshev));
+    if (n > 0)
+      level.octants = std::make_unique<const Transfer>(
+          Transfer::toOctants(orderOf(nodes[n - 1])->chebyshev(), orderOf(nodes[n])->chebyshev()));
+  }
+  for (const Interactions::FarPair& pair : seen_.far) {
+    const int n = nodes[static_cast<std::size_t>(targets_->nodes()[pair.target].level)];
+    orderOf(nodesFor(pair.kind.kind, n))->prepare(pair.kind.kind);
   }
 }
 
 FastSum::Offsets FastSum::offsetsOf(const Octree& tree) const {
   Offsets out{0};
-  for (const OctreeNode& node : tree.nodes()) out.push_back(out.back() + orderOf(node.level).chebyshev.stored());
+  for (const OctreeNode& node : tree.nodes()) out.push_back(out.back() + levelOf(node).first.back());
   return out;
 }
 
 std::size_t FastSum::bytes() const {
-  return far_.size() * sizeof(FarPair) + (near_.source.size() + from_nodes_.source.size()) * sizeof(std::uint32_t) +
+  return seen_.far.size() * sizeof(Interactions::FarPair) +
+         (seen_.near.source.size() + seen_.from_nodes.source.size()) * sizeof(std::uint32_t) +
          (sources_->size() + targets_->size()) * 28 + (up_first_.back() + down_first_.back()) * sizeof(double);
+}
+
+template <class Use>
+void FastSum::eachOf(const Octree& tree, int level, const Use& use) const {
+  const std::size_t first = tree.levelFirst(level);
+  parallelBlocks(tree.levelFirst(level + 1) - first, 16, options_.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) use(first + n);
+  });
 }
 
 FastSum::Values FastSum::gatherUp(std::span<const double> weights) const {
   const Octree& tree = *sources_;
-  const std::vector<OctreeNode>& nodes = tree.nodes();
   Values up(up_first_.back(), 0.0);
-  parallelBlocks(nodes.size(), 16, options_.threads, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      if (!nodes[n].leaf()) continue;
-      const Vec3 m = tree.middleOf(nodes[n]);
-      const double middle[3] = {m.x, m.y, m.z};
-      orderOf(nodes[n].level)
-          .chebyshev.gather(tree.points(nodes[n]), weights.data() + nodes[n].first, middle, tree.halfOf(nodes[n].level),
-                            up.data() + up_first_[n]);
-    }
-  });
-  for (std::size_t n = nodes.size(); n-- > 0;) {
-    for (std::int32_t c = 0; c < nodes[n].child_count; ++c) {
-      const std::size_t child = static_cast<std::size_t>(nodes[n].children + c);
-      transfers_[static_cast<std::size_t>(nodes[child].level)]->toParent(
-          octantOf(nodes[child]), up.data() + up_first_[child], up.data() + up_first_[n]);
-    }
+  for (int at = tree.depth(); at >= kFirstFar; --at) {
+    const Level& level = levels_[static_cast<std::size_t>(at)];
+    eachOf(tree, at, [&](std::size_t n) {
+      const OctreeNode& node = tree.nodes()[n];
+      double* const own = up.data() + up_first_[n];
+      if (node.leaf()) {
+        const Vec3 m = tree.middleOf(node);
+        const double middle[3] = {m.x, m.y, m.z};
+        chebyshevOf(node).gather(tree.points(node), weights.data() + node.first, middle, tree.halfOf(at), own);
+      }
+      for (std::int32_t c = 0; c < node.child_count; ++c) {
+        const std::size_t child = static_cast<std::size_t>(node.children + c);
+        const OctreeNode& from = tree.nodes()[child];
+        levelOf(from).octants->toCoarse(octantOf(from), up.data() + up_first_[child], own);
+      }
+      for (std::size_t part = 0; part < level.narrower.size(); ++part)
+        level.narrower[part].toCoarse(0, own + level.first[part], own + level.first[part + 1]);
+    });
   }
   return up;
 }
 
+template <class T>
+void FastSum::farColumns(std::size_t from, std::size_t columns, const Values& up, Values& down, std::vector<T>& x,
+                         std::vector<T>& y) const {
+  const OctreeNode& first = targets_->nodes()[seen_.far[from].target];
+  const Level& level = levelOf(first);
+  const int kind = seen_.far[from].kind.kind;
+  const auto part = static_cast<std::size_t>(level.nodes - nodesFor(kind, level.nodes));
+  const FarOrder& order = *level.orders[part];
+  const std::size_t stored = order.chebyshev().stored(), count = order.chebyshev().values();
+  const double scale = sources_->halfOf(first.level);
+  x.resize(count * kColumns), y.resize(stored * kColumns);
+  for (std::size_t c = 0; c < columns; ++c) {
+    const Interactions::FarPair& pair = seen_.far[from + c];
+    const double* const source = up.data() + up_first_[pair.source] + level.first[part];
+    const std::vector<std::uint16_t>& turned = order.turned(pair.kind.turn);
+    T* const to = x.data() + c * count;
+    for (std::size_t n = 0; n < count; ++n) to[turned[n]] = static_cast<T>(scale * source[n]);
+  }
+  order.see(kind, x.data(), columns, y.data());
+  for (std::size_t c = 0; c < columns; ++c) {
+    const Interactions::FarPair& pair = seen_.far[from + c];
+    double* const target = down.data() + down_first_[pair.target] + level.first[part];
+    const std::vector<std::uint16_t>& turned = order.turned(pair.kind.turn);
+    const T* const result = y.data() + c * stored;
+    for (std::size_t n = 0; n < count; ++n) target[n] += static_cast<double>(result[turned[n]]);
+  }
+}
+
 void FastSum::farGroup(std::size_t group, const Values& up, Values& down) const {
   std::vector<double> x, y;
-  for (std::size_t from = far_first_[group]; from < far_first_[group + 1];) {
-    const int level = targets_->nodes()[far_[from].target].level;
-    const Order& order = orderOf(level);
-    const std::size_t stored = order.chebyshev.stored(), count = order.chebyshev.values();
-    const double scale = sources_->halfOf(level);
-    x.resize(count * kColumns), y.resize(stored * kColumns);
-    std::size_t columns = 0;
-    for (; columns < kColumns && from + columns < far_first_[group + 1]; ++columns) {
-      const FarPair& pair = far_[from + columns];
-      if (pair.kind != far_[from].kind || targets_->nodes()[pair.target].level != level) break;
-      const double* const source = up.data() + up_first_[pair.source];
-      const std::vector<std::uint16_t>& turn = order.turns[pair.turn];
-      double* const to = x.data() + columns * count;
-      for (std::size_t n = 0; n < count; ++n) to[turn[n]] = scale * source[n];
-    }
-    multiply(order.matrices[far_[from].kind].data(), stored, count, x.data(), count, columns, y.data(), stored);
-    for (std::size_t c = 0; c < columns; ++c) {
-      const FarPair& pair = far_[from + c];
-      double* const target = down.data() + down_first_[pair.target];
-      const std::vector<std::uint16_t>& turn = order.turns[pair.turn];
-      const double* const result = y.data() + c * stored;
-      for (std::size_t n = 0; n < count; ++n) target[n] += result[turn[n]];
+  std::vector<float> single_x, single_y;
+  const std::vector<OctreeNode>& nodes = targets_->nodes();
+  const std::size_t end = seen_.far_first[group + 1];
+  for (std::size_t from = seen_.far_first[group]; from < end;) {
+    const int kind = seen_.far[from].kind.kind, level = nodes[seen_.far[from].target].level;
+    std::size_t columns = 1;
+    while (columns < kColumns && from + columns < end && seen_.far[from + columns].kind.kind == kind &&
+           nodes[seen_.far[from + columns].target].level == level)
+      ++columns;
+    const Level& own = levels_[static_cast<std::size_t>(level)];
+    if (own.orders[static_cast<std::size_t>(own.nodes - nodesFor(kind, own.nodes))]->single()) {
+      farColumns(from, columns, up, down, single_x, single_y);
+    } else {
+      farColumns(from, columns, up, down, x, y);
     }
     from += columns;
   }
@@ -353,16 +237,17 @@ void FastSum::farGroup(std::size_t group, const Values& up, Values& down) const 
 
 FastSum::Values FastSum::passAcross(const Values& up, std::span<const double> weights) const {
   const std::vector<OctreeNode>& nodes = targets_->nodes();
+  const Interactions::Lists& lists = seen_.to_nodes;
   Values down(down_first_.back(), 0.0);
-  parallelBlocks(far_first_.size() - 1, 1, options_.threads, [&](std::size_t begin, std::size_t end) {
+  parallelBlocks(seen_.far_first.size() - 1, 1, options_.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t group = begin; group < end; ++group) farGroup(group, up, down);
   });
   parallelBlocks(nodes.size(), 16, options_.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      if (to_nodes_.first[n] == to_nodes_.first[n + 1]) continue;
-      const Gathered<double> at = nodesOf(orderOf(nodes[n].level).chebyshev, *targets_, nodes[n]);
-      for (std::uint32_t i = to_nodes_.first[n]; i < to_nodes_.first[n + 1]; ++i) {
-        const OctreeNode& source = sources_->nodes()[to_nodes_.source[i]];
+      if (lists.first[n] == lists.first[n + 1]) continue;
+      const Gathered<double> at = nodesOf(chebyshevOf(nodes[n]), *targets_, nodes[n]);
+      for (std::uint32_t i = lists.first[n]; i < lists.first[n + 1]; ++i) {
+        const OctreeNode& source = sources_->nodes()[lists.source[i]];
         addDistances(at.points(), sources_->points(source), weights.data() + source.first,
                      down.data() + down_first_[n]);
       }
@@ -372,19 +257,27 @@ FastSum::Values FastSum::passAcross(const Values& up, std::span<const double> we
 }
 
 void FastSum::passDown(Values& down) const {
-  const std::vector<OctreeNode>& nodes = targets_->nodes();
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
-    for (std::int32_t c = 0; c < nodes[n].child_count; ++c) {
-      const std::size_t child = static_cast<std::size_t>(nodes[n].children + c);
-      transfers_[static_cast<std::size_t>(nodes[child].level)]->toChild(
-          octantOf(nodes[child]), down.data() + down_first_[n], down.data() + down_first_[child]);
-    }
+  const Octree& tree = *targets_;
+  for (int at = kFirstFar; at <= tree.depth(); ++at) {
+    const Level& level = levels_[static_cast<std::size_t>(at)];
+    eachOf(tree, at, [&](std::size_t n) {
+      double* const own = down.data() + down_first_[n];
+      for (std::size_t part = level.narrower.size(); part-- > 0;)
+        level.narrower[part].toFine(0, own + level.first[part + 1], own + level.first[part]);
+      const OctreeNode& node = tree.nodes()[n];
+      for (std::int32_t c = 0; c < node.child_count; ++c) {
+        const std::size_t child = static_cast<std::size_t>(node.children + c);
+        const OctreeNode& to = tree.nodes()[child];
+        levelOf(to).octants->toFine(octantOf(to), own, down.data() + down_first_[child]);
+      }
+    });
   }
 }
 
 template <class Use>
 void FastSum::eachLeaf(const Values& up, std::span<const double> weights, const Use& use) const {
   const std::vector<OctreeNode>& nodes = targets_->nodes();
+  const Interactions::Lists &near = seen_.near, &from_nodes = seen_.from_nodes;
   parallelBlocks(nodes.size(), 8, options_.threads, [&](std::size_t begin, std::size_t end) {
     Gathered<double> wide;
     Gathered<float> narrow;
@@ -393,18 +286,18 @@ void FastSum::eachLeaf(const Values& up, std::span<const double> weights, const 
       if (!node.leaf() || node.count == 0) continue;
       const Vec3 middle = targets_->middleOf(node);
       wide.clear(), narrow.clear();
-      for (std::uint32_t i = near_.first[n]; i < near_.first[n + 1]; ++i) {
-        const OctreeNode& source = sources_->nodes()[near_.source[i]];
-        if (options_.single_near) {
-          narrow.add(sources_->points(source), weights.data() + source.first, middle);
-        } else {
-          wide.add(sources_->points(source), weights.data() + source.first, middle);
-        }
+      for (std::uint32_t i = near.first[n]; i < near.first[n + 1]; ++i) {
+        const OctreeNode& source = sources_->nodes()[near.source[i]];
+        wide.add(sources_->points(source), weights.data() + source.first, middle);
       }
-      for (std::uint32_t i = from_nodes_.first[n]; i < from_nodes_.first[n + 1]; ++i) {
-        const std::size_t source = from_nodes_.source[i];
+      if (options_.near_error > 0 && singleError(wide, targets_->halfOf(node.level)) <= options_.near_error) {
+        narrow.addAll(wide);
+        wide.clear();
+      }
+      for (std::uint32_t i = from_nodes.first[n]; i < from_nodes.first[n + 1]; ++i) {
+        const std::size_t source = from_nodes.source[i];
         const OctreeNode& cube = sources_->nodes()[source];
-        const Gathered<double> at = nodesOf(orderOf(cube.level).chebyshev, *sources_, cube);
+        const Gathered<double> at = nodesOf(chebyshevOf(cube), *sources_, cube);
         wide.add(at.points(), up.data() + up_first_[source], middle);
       }
       use(n, middle, wide, narrow);
@@ -423,8 +316,8 @@ void FastSum::values(std::span<const double> weights, std::span<double> out) con
     const PointArrays<double> points = targets_->points(node);
     double* const to = sums.data() + node.first;
     const double middle[3] = {m.x, m.y, m.z};
-    orderOf(node.level)
-        .chebyshev.spread(down.data() + down_first_[n], middle, targets_->halfOf(node.level), points, to);
+    if (node.level >= kFirstFar)
+      chebyshevOf(node).spread(down.data() + down_first_[n], middle, targets_->halfOf(node.level), points, to);
     Gathered<double> own;
     own.add(points, nullptr, m);
     if (!wide.x.empty()) addDistances(own.points(), wide.points(), wide.w.data(), to);
@@ -448,9 +341,9 @@ void FastSum::gradients(std::span<const double> weights, std::span<Vec3> out) co
     const PointArrays<double> points = targets_->points(node);
     const std::size_t at = node.first;
     const double middle[3] = {m.x, m.y, m.z};
-    orderOf(node.level)
-        .chebyshev.spreadGradient(down.data() + down_first_[n], middle, targets_->halfOf(node.level), points,
-                                  x.data() + at, y.data() + at, z.data() + at);
+    if (node.level >= kFirstFar)
+      chebyshevOf(node).spreadGradient(down.data() + down_first_[n], middle, targets_->halfOf(node.level), points,
+                                       x.data() + at, y.data() + at, z.data() + at);
     Gathered<double> own;
     own.add(points, nullptr, m);
     if (!wide.x.empty())

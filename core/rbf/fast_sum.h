@@ -1,6 +1,5 @@
 // core/rbf/fast_sum.h - sum_j w_j |t_i - s_j| for all targets at once, in time linear in sources and targets
-// (internal). After: Fong and Darve, "The black-box fast multipole method", J. Comput. Phys. 228 (2009), with the lists
-// of an adaptive tree as in Carrier, Greengard and Rokhlin, SIAM J. Sci. Stat. Comput. 9 (1988).
+// (internal). After: Fong and Darve, "The black-box fast multipole method", J. Comput. Phys. 228 (2009).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -10,14 +9,21 @@
 
 #include "core/base/vec3.h"
 #include "core/rbf/chebyshev.h"
+#include "core/rbf/far_order.h"
+#include "core/rbf/interactions.h"
 #include "core/rbf/octree.h"
 
 namespace spinaltap::rbf {
 
 struct FastSumOptions {
-  int nodes = 6;                ///< Chebyshev nodes an axis: 4 give about 1e-3 of what far points weigh, 7 about 1e-6
-  bool single_near = false;     ///< near pairs in single precision, relative to the target's cube: three times as fast
-  std::size_t leaf_size = 120;  ///< a source cube is split while it holds more
+  /// Chebyshev nodes an axis of the largest cubes, and one fewer a level: 6 give about 1e-5 of what far points weigh.
+  int nodes = 6;
+  /// Not empty: instead, each level has as many as keep the sums of these source weights within about `error`.
+  std::span<const double> weights;
+  double error = 0;
+  /// A leaf's near pairs are in single precision, three times as fast, where that is expected to move no sum by more.
+  double near_error = 0;
+  std::size_t leaf_size = 120;         ///< a source cube is split while it holds more
   std::size_t target_leaf_size = 120;  ///< and a target cube
   unsigned threads = 0;
 };
@@ -38,48 +44,48 @@ class FastSum {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  struct FarPair {
-    std::uint32_t target, source;
-    std::uint8_t kind, turn;  ///< which of 16 matrices, seen through which of 48 symmetries of the cube
-  };
-  /// Per target node a list of source nodes.
-  struct Lists {
-    std::vector<std::uint32_t> first;  ///< #nodes + 1
-    std::vector<std::uint32_t> source;
-  };
-  class Listing;  ///< builds the lists
+  static constexpr int kFirstFar = 2;  ///< no cube is far from another above this level
 
+  /// What the cubes of one level are told by: a part with `nodes` for the nearest kinds of pairs, and smaller ones for
+  /// those farther apart.
+  struct Level {
+    int nodes = 0;
+    std::vector<std::shared_ptr<const FarOrder>> orders;  ///< of each part
+    std::vector<std::size_t> first;                       ///< where each part's values begin, and their whole length
+    std::vector<Transfer> narrower;                       ///< from each part to the next
+    std::unique_ptr<const Transfer> octants;              ///< from the first part to the parents'
+  };
   using Values = std::vector<double>;
+  using Offsets = std::vector<std::size_t>;  ///< where each node's values begin
+
+  [[nodiscard]] std::vector<int> nodesOfLevels(int levels) const;
+  void makeLevels(const std::vector<int>& nodes_of_levels);
+  [[nodiscard]] const Level& levelOf(const OctreeNode& node) const {
+    return levels_[static_cast<std::size_t>(node.level)];
+  }
+  [[nodiscard]] const Chebyshev& chebyshevOf(const OctreeNode& node) const {
+    return levelOf(node).orders[0]->chebyshev();
+  }
+  [[nodiscard]] Offsets offsetsOf(const Octree& tree) const;
+  /// use(node index) for the nodes of a level, by all threads.
+  template <class Use>
+  void eachOf(const Octree& tree, int level, const Use& use) const;
+
   [[nodiscard]] Values gatherUp(std::span<const double> sorted_weights) const;
   [[nodiscard]] Values passAcross(const Values& up, std::span<const double> sorted_weights) const;
   void farGroup(std::size_t group, const Values& up, Values& down) const;
+  template <class T>
+  void farColumns(std::size_t from, std::size_t columns, const Values& up, Values& down, std::vector<T>& x,
+                  std::vector<T>& y) const;
   void passDown(Values& down) const;
   /// What reaches the target leaves: near points, and nodes of small far cubes.
   template <class Use>
   void eachLeaf(const Values& up, std::span<const double> sorted_weights, const Use& use) const;
 
-  /// What the cubes of one level are told by.
-  struct Order {
-    Chebyshev chebyshev;
-    std::vector<std::vector<double>> matrices;         ///< 16, stored() x values()
-    std::array<std::vector<std::uint16_t>, 48> turns;  ///< node n of a cube is node turns[turn][n] of the turned one
-    explicit Order(int nodes);
-  };
-  /// Where each node's values begin.
-  using Offsets = std::vector<std::size_t>;
-  void makeOrders();
-  [[nodiscard]] const Order& orderOf(int level) const { return *orders_[static_cast<std::size_t>(level)]; }
-  [[nodiscard]] Offsets offsetsOf(const Octree& tree) const;
-
   FastSumOptions options_;
   std::shared_ptr<const Octree> sources_, targets_;
-  Lists near_;                          ///< leaf on leaf: point by point
-  Lists from_nodes_;                    ///< leaf on the nodes of a smaller cube that it does not touch
-  Lists to_nodes_;                      ///< a cube's nodes on the points of a larger leaf that does not touch it
-  std::vector<FarPair> far_;            ///< by group, then level, then kind
-  std::vector<std::size_t> far_first_;  ///< #groups + 1
-  std::vector<std::shared_ptr<const Order>> orders_;        ///< by level
-  std::vector<std::shared_ptr<const Transfer>> transfers_;  ///< by the child's level
+  std::vector<Level> levels_;
+  Interactions seen_;
   Offsets up_first_, down_first_;
 };
 

@@ -85,7 +85,11 @@ Octree::Octree(std::span<const Vec3> points, const RootCube& root, std::size_t l
     }
   });
   nodes_.push_back({0, {0, 0, 0}, 0, static_cast<std::uint32_t>(items.size()), -1, 0});
-  for (std::size_t n = 0; n < nodes_.size(); ++n) split(n, keys, leaf_size, std::min(deepest, kDeepest));
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    if (static_cast<std::size_t>(nodes_[n].level) == level_first_.size()) level_first_.push_back(n);
+    split(n, keys, leaf_size, std::min(deepest, kDeepest));
+  }
+  level_first_.push_back(nodes_.size());
 }
 
 void Octree::split(std::size_t n, const std::vector<std::uint64_t>& keys, std::size_t leaf_size, int deepest) {
@@ -108,7 +112,6 @@ void Octree::split(std::size_t n, const std::vector<std::uint64_t>& keys, std::s
     ++nodes_[n].child_count;
     from = to;
   }
-  depth_ = std::max(depth_, node.level + 1);
 }
 
 Vec3 Octree::middleOf(const OctreeNode& node) const {

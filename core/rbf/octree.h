@@ -32,7 +32,7 @@ struct OctreeNode {
 };
 
 /// Cubes are split while they hold more than `leaf_size` points, down to kDeepest levels. Parents come before children,
-/// so a loop over nodes goes down the tree and a reverse loop up.
+/// so a loop over nodes goes down the tree and a reverse loop up; those of a level stand together.
 class Octree {
  public:
   static constexpr int kDeepest = 20;
@@ -42,7 +42,9 @@ class Octree {
 
   [[nodiscard]] const std::vector<OctreeNode>& nodes() const { return nodes_; }
   [[nodiscard]] const RootCube& root() const { return root_; }
-  [[nodiscard]] int depth() const { return depth_; }
+  [[nodiscard]] int depth() const { return static_cast<int>(level_first_.size()) - 2; }
+  /// The nodes of level n are those from levelFirst(n) to before levelFirst(n + 1). @pre level <= depth() + 1.
+  [[nodiscard]] std::size_t levelFirst(int level) const { return level_first_[static_cast<std::size_t>(level)]; }
   /// order()[n] is the index of the tree's n-th point among those given.
   [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }
   /// The n-th points' coordinates relative to the root's middle.
@@ -58,8 +60,8 @@ class Octree {
   void split(std::size_t node, const std::vector<std::uint64_t>& keys, std::size_t leaf_size, int deepest);
 
   RootCube root_;
-  int depth_ = 0;
   std::vector<OctreeNode> nodes_;
+  std::vector<std::size_t> level_first_;
   std::vector<std::uint32_t> order_;
   std::vector<double> x_, y_, z_;
 };

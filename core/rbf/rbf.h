@@ -102,9 +102,9 @@ class Evaluator {
                        std::span<Vec3> out) const;
 
   Model model_;
+  double tolerance_;
   unsigned threads_;
-  int nodes_ = 0;  ///< Chebyshev nodes an axis; 0: direct only
-  bool single_near_ = false;
+  double error_ = 0;  ///< what sums are asked to stay within; 0: direct only
 };
 
 /// The model as a callback; it is copied. `lipschitz` is what the caller can vouch for (at least 1 is assumed).

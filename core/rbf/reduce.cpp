@@ -48,20 +48,13 @@ class Spacing {
   std::unordered_map<std::int64_t, std::vector<Vec3>> cells_;
 };
 
-double largestOf(std::span<const double> values) {
-  double most = 0;
-  for (const double v : values) most = std::max(most, std::abs(v));
-  return most;
-}
-
 /// The reduced fit minus the values.
 std::vector<double> missed(std::span<const Vec3> points, std::span<const double> values,
                            const std::vector<Vec3>& centres, const SystemSolution& s, double tolerance,
                            unsigned threads) {
   FastSumOptions options;
-  options.threads = threads, options.leaf_size = 120, options.single_near = tolerance > 1e-2 * largestOf(values);
-  // Six nodes are wrong by about 1e-5 of what the far centres weigh; a seventh where that is too much.
-  options.nodes = tolerance < 1e-4 ? 7 : 6;
+  options.threads = threads;
+  options.weights = s.weights, options.error = 0.1 * tolerance, options.near_error = 0.1 * tolerance;
   const FastSum sum(centres, points, options);
   std::vector<double> out(points.size());
   sum.values(s.weights, out);

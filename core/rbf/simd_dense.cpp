@@ -63,11 +63,11 @@ struct Tile {
   }
 };
 
-template <int kVectors, int kColumns>
-void multiplyTile(const double* a, std::size_t rows, std::size_t inner, const double* x, std::size_t x_stride,
-                  double* y, std::size_t y_stride) {
-  Tile<double, kVectors, kColumns> tile;
-  const hn::ScalableTag<double> d;
+template <int kVectors, int kColumns, class T>
+void multiplyTile(const T* a, std::size_t rows, std::size_t inner, const T* x, std::size_t x_stride, T* y,
+                  std::size_t y_stride) {
+  Tile<T, kVectors, kColumns> tile;
+  const hn::ScalableTag<T> d;
   tile.clear();
   tile.add({a, rows, x, 1, x_stride, inner});
   for (int c = 0; c < kColumns; ++c)
@@ -76,22 +76,35 @@ void multiplyTile(const double* a, std::size_t rows, std::size_t inner, const do
                  y + static_cast<std::size_t>(c) * y_stride + static_cast<std::size_t>(v) * hn::Lanes(d));
 }
 
-template <int kColumns>
-void multiplyColumns(const double* a, std::size_t rows, std::size_t inner, const double* x, std::size_t x_stride,
-                     double* y, std::size_t y_stride) {
-  const std::size_t lanes = hn::Lanes(hn::ScalableTag<double>());
+template <int kColumns, class T>
+void multiplyColumns(const T* a, std::size_t rows, std::size_t inner, const T* x, std::size_t x_stride, T* y,
+                     std::size_t y_stride) {
+  const std::size_t lanes = hn::Lanes(hn::ScalableTag<T>());
   std::size_t row = 0;
   for (; row + kTileVectors * lanes <= rows; row += kTileVectors * lanes)
     multiplyTile<kTileVectors, kColumns>(a + row, rows, inner, x, x_stride, y + row, y_stride);
+  if (row + 2 * lanes <= rows) {
+    multiplyTile<2, kColumns>(a + row, rows, inner, x, x_stride, y + row, y_stride);
+    row += 2 * lanes;
+  }
   for (; row < rows; row += lanes) multiplyTile<1, kColumns>(a + row, rows, inner, x, x_stride, y + row, y_stride);
 }
 
-void multiplyAll(const double* a, std::size_t rows, std::size_t inner, const double* x, std::size_t x_stride,
-                 std::size_t columns, double* y, std::size_t y_stride) {
+template <class T>
+void multiplyAll(const T* a, std::size_t rows, std::size_t inner, const T* x, std::size_t x_stride, std::size_t columns,
+                 T* y, std::size_t y_stride) {
   std::size_t c = 0;
   for (; c + kTileColumns <= columns; c += kTileColumns)
     multiplyColumns<kTileColumns>(a, rows, inner, x + c * x_stride, x_stride, y + c * y_stride, y_stride);
   for (; c < columns; ++c) multiplyColumns<1>(a, rows, inner, x + c * x_stride, x_stride, y + c * y_stride, y_stride);
+}
+void multiplyDouble(const double* a, std::size_t rows, std::size_t inner, const double* x, std::size_t x_stride,
+                    std::size_t columns, double* y, std::size_t y_stride) {
+  multiplyAll(a, rows, inner, x, x_stride, columns, y, y_stride);
+}
+void multiplySingle(const float* a, std::size_t rows, std::size_t inner, const float* x, std::size_t x_stride,
+                    std::size_t columns, float* y, std::size_t y_stride) {
+  multiplyAll(a, rows, inner, x, x_stride, columns, y, y_stride);
 }
 
 /// Subtracts from rows of tile (row, column) the products of the tiles left of it and of its column's diagonal tile.
@@ -252,7 +265,8 @@ HWY_AFTER_NAMESPACE();
 namespace spinaltap::rbf {
 namespace {
 
-HWY_EXPORT(multiplyAll);
+HWY_EXPORT(multiplyDouble);
+HWY_EXPORT(multiplySingle);
 HWY_EXPORT(updateDouble);
 HWY_EXPORT(updateSingle);
 HWY_EXPORT(factorDouble);
@@ -286,7 +300,11 @@ constexpr std::size_t kTilesWorthThreads = 16;
 
 void multiply(const double* a, std::size_t rows, std::size_t inner, const double* x, std::size_t x_stride,
               std::size_t columns, double* y, std::size_t y_stride) {
-  HWY_DYNAMIC_DISPATCH(multiplyAll)(a, rows, inner, x, x_stride, columns, y, y_stride);
+  HWY_DYNAMIC_DISPATCH(multiplyDouble)(a, rows, inner, x, x_stride, columns, y, y_stride);
+}
+void multiply(const float* a, std::size_t rows, std::size_t inner, const float* x, std::size_t x_stride,
+              std::size_t columns, float* y, std::size_t y_stride) {
+  HWY_DYNAMIC_DISPATCH(multiplySingle)(a, rows, inner, x, x_stride, columns, y, y_stride);
 }
 
 template <class T>

@@ -42,7 +42,8 @@ std::vector<double> exactResidual(const std::vector<Vec3>& points, double ridge,
 
 FastSumOptions sumOptions(int nodes, bool single, unsigned threads) {
   FastSumOptions options;
-  options.nodes = nodes, options.single_near = single, options.threads = threads, options.leaf_size = 200;
+  options.nodes = nodes, options.threads = threads, options.leaf_size = 200;
+  options.near_error = single ? std::numeric_limits<double>::infinity() : 0;
   return options;
 }
 

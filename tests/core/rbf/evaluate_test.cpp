@@ -44,11 +44,11 @@ TEST(Evaluate, TheGradientIsTheSlopeAndIsFiniteOnACentre) {
 }
 
 TEST(Evaluator, StaysWithinItsToleranceOfTheOracleForValuesAndTheirSlopes) {
-  const Samples s = sphere(1500, {10, 20, 30}, 23, 0.05);
+  const Samples s = sphere(900, {10, 20, 30}, 23, 0.05);
   const Model m = fit(s, {.tolerance_mm = 0.01}).value().model;
   Random random(24);
   std::vector<Vec3> points;
-  for (int i = 0; i < 6000; ++i) points.push_back(Vec3{10, 20, 30} + randomPoint(random, 25));
+  for (int i = 0; i < 3000; ++i) points.push_back(Vec3{10, 20, 30} + randomPoint(random, 25));
   for (int i = 0; i < 200; ++i) points.push_back(s.positions[static_cast<std::size_t>(i)]);           // on centres
   for (int i = 0; i < 50; ++i) points.push_back(randomDirection(random) * random.uniform(1e3, 1e7));  // far away
   std::vector<double> direct(points.size()), fast(points.size());
@@ -62,7 +62,7 @@ TEST(Evaluator, StaysWithinItsToleranceOfTheOracleForValuesAndTheirSlopes) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       ASSERT_NEAR(fast[i], direct[i], tolerance) << "seed 24, point " << i;
       ASSERT_TRUE(isFinite(fast_slope[i]));
-      if (i >= 6000 && i < 6200) continue;  // a centre's own direction turns about there
+      if (i >= 3000 && i < 3200) continue;  // a centre's own direction turns about there
       // An error that varies over the smallest cubes, some 3 mm, with polynomials of degree up to 7.
       ASSERT_LT(norm(fast_slope[i] - direct_slope[i]), tolerance * 49 / 1.5 + 1e-6) << "seed 24, point " << i;
     }

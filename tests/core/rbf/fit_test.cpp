@@ -20,8 +20,8 @@ Samples randomSamples(std::size_t count, std::uint64_t seed) {
 }
 
 TEST(Fit, MeetsEverySampleDirectlyAndIteratively) {
-  // 300 samples are solved directly, 6,000 by search directions.
-  for (const std::size_t count : {300UL, 6000UL}) {
+  // 300 samples are solved directly, 2,700 by search directions.
+  for (const std::size_t count : {300UL, 2700UL}) {
     const Samples s = count == 300 ? randomSamples(count, 3) : sphere(count / 3, {1, 2, 3}, 3);
     const auto fitted = fit(s, {.tolerance_mm = 1e-4});
     ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
@@ -32,7 +32,7 @@ TEST(Fit, MeetsEverySampleDirectlyAndIteratively) {
 }
 
 TEST(Fit, IterativelyFindsWhatTheDirectSolverFinds) {
-  const Samples s = sphere(1200, {0, 0, 0}, 21, 0.1);  // 3,600
+  const Samples s = sphere(900, {0, 0, 0}, 21, 0.1);  // 2,700
   for (const double ridge : {0.0, 0.3}) {
     const auto fitted = fit(s, {.tolerance_mm = 1e-6, .smoothing = ridge});
     ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
@@ -53,7 +53,7 @@ TEST(Fit, IterativelyFindsWhatTheDirectSolverFinds) {
 }
 
 TEST(Fit, WeightsAreOrthogonalToLinearPolynomials) {
-  const auto fitted = fit(sphere(1500, {5, 6, 7}, 4), {.tolerance_mm = 0.01, .smoothing = 0.1});
+  const auto fitted = fit(sphere(900, {5, 6, 7}, 4), {.tolerance_mm = 0.01, .smoothing = 0.1});
   ASSERT_TRUE(fitted.has_value());
   double sum = 0;
   Vec3 moment;
@@ -68,7 +68,7 @@ TEST(Fit, WeightsAreOrthogonalToLinearPolynomials) {
 
 TEST(Fit, ReproducesALinearFunctionWithNoWeights) {
   Random random(5);
-  for (const int count : {200, 4000}) {
+  for (const int count : {200, 2700}) {
     Samples s;
     for (int i = 0; i < count; ++i) {
       const Vec3 p = randomPoint(random, 30);
@@ -86,7 +86,7 @@ TEST(Fit, ReproducesALinearFunctionWithNoWeights) {
 
 TEST(Fit, ReportsItsResidualsAsDirectSummationFindsThem) {
   for (const double reduce : {0.0, 0.05}) {
-    const Samples s = sphere(1500, {0, 0, 0}, 6, 0.05);
+    const Samples s = sphere(900, {0, 0, 0}, 6, 0.05);
     const auto fitted = fit(s, {.tolerance_mm = 0.01, .smoothing = 0.2, .reduce_mm = reduce});
     ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
     const Residuals r = plainResiduals(fitted->model, s);
@@ -133,7 +133,7 @@ TEST(Fit, EstimatesTheNoiseAndSmoothsByIt) {
 }
 
 TEST(Fit, LeavesSmoothSamplesAsTheyAre) {
-  const auto fitted = fit(sphere(3000, {0, 0, 0}, 10), {.tolerance_mm = 0.01, .smoothing = kAutoSmoothing});
+  const auto fitted = fit(sphere(1500, {0, 0, 0}, 10), {.tolerance_mm = 0.01, .smoothing = kAutoSmoothing});
   ASSERT_TRUE(fitted.has_value());
   // Over the 3.3 mm of a neighbourhood and 1 mm to either side, the distance to a sphere of 20 mm has a cubic part of
   // r^2 z / (2 R^2) = 0.014 mm, which a quadratic takes for noise.
@@ -142,7 +142,7 @@ TEST(Fit, LeavesSmoothSamplesAsTheyAre) {
 
 TEST(Fit, IsTheSameSurfaceWhereverItsOriginAndWhateverItsUnit) {
   const FitOptions options{.tolerance_mm = 1e-3, .smoothing = 0.1};
-  const auto here = fit(sphere(1200, {0, 0, 0}, 11), options);
+  const auto here = fit(sphere(900, {0, 0, 0}, 11), options);
   ASSERT_TRUE(here.has_value());
   struct Place {
     Vec3 origin;
@@ -150,7 +150,7 @@ TEST(Fit, IsTheSameSurfaceWhereverItsOriginAndWhateverItsUnit) {
   };
   for (const Place place :
        {Place{{1e8, -1e8, 1e8}, 1}, Place{{0, 0, 0}, 1e-3}, Place{{0, 0, 0}, 1e3}, Place{{5e4, 0, 0}, 1e-6}}) {
-    const auto there = fit(sphere(1200, place.origin, 11, 0, place.unit),
+    const auto there = fit(sphere(900, place.origin, 11, 0, place.unit),
                            {.tolerance_mm = 1e-3 * place.unit, .smoothing = 0.1 * place.unit});
     ASSERT_TRUE(there.has_value()) << there.error().message;
     Random random(12);
@@ -184,7 +184,7 @@ TEST(Fit, CountsSamplesAtOnePlaceAsOneWithTheirMean) {
 }
 
 TEST(Fit, MeetsSamplesThatAreCloseButNotEqual) {
-  Samples s = sphere(1500, {0, 0, 0}, 13);
+  Samples s = sphere(900, {0, 0, 0}, 13);
   const std::size_t before = s.positions.size();
   for (std::size_t i = 0; i < before; i += 10) {
     s.positions.push_back(s.positions[i] + Vec3{0.002, 0, 0});
@@ -197,7 +197,7 @@ TEST(Fit, MeetsSamplesThatAreCloseButNotEqual) {
 }
 
 TEST(Fit, SaysHowFarItCameWhenTheToleranceIsBelowWhatDoubleCanGive) {
-  for (const std::size_t count : {100UL, 1500UL}) {
+  for (const std::size_t count : {100UL, 900UL}) {
     const auto fitted = fit(sphere(count, {0, 0, 0}, 14), {.tolerance_mm = 1e-17});
     ASSERT_FALSE(fitted.has_value());
     EXPECT_EQ(fitted.error().code, ErrorCode::NotConverged);
@@ -206,7 +206,7 @@ TEST(Fit, SaysHowFarItCameWhenTheToleranceIsBelowWhatDoubleCanGive) {
 }
 
 TEST(Fit, HasTheSameBitsFromAnyNumberOfThreads) {
-  const Samples s = sphere(1500, {0, 0, 0}, 15, 0.1);
+  const Samples s = sphere(900, {0, 0, 0}, 15, 0.1);
   const FitOptions one{.smoothing = kAutoSmoothing, .reduce_mm = 0.1, .threads = 1};
   FitOptions three = one;
   three.threads = 3;
@@ -261,7 +261,7 @@ TEST(Fit, TakesFourSamplesAndFlatPatchesWithinASolidSet) {
 TEST(Fit, ReportsProgressThatNeverGoesBack) {
   double last = 0;
   const auto fitted =
-      fit(sphere(1500, {0, 0, 0}, 14, 0.1), {.smoothing = kAutoSmoothing, .reduce_mm = 0.1}, [&last](double now) {
+      fit(sphere(900, {0, 0, 0}, 14, 0.1), {.smoothing = kAutoSmoothing, .reduce_mm = 0.1}, [&last](double now) {
         EXPECT_GE(now, last);
         last = now;
       });

@@ -153,21 +153,28 @@ TEST(TiledCholesky, RefusesAMatrixThatIsNotPositiveDefinite) {
   EXPECT_FALSE(negative.factor());
 }
 
-TEST(Multiply, IsThePlainProduct) {
+template <class T>
+void expectPlainProduct(double rounding) {
   Random random(3);
   for (const std::size_t columns : {1UL, 3UL, 8UL, 21UL}) {
-    const std::size_t rows = 40, inner = 27;
-    std::vector<double> a(rows * inner), x(inner * columns), y(rows * columns);
-    for (double& v : a) v = random.uniform(-1, 1);
-    for (double& v : x) v = random.uniform(-1, 1);
+    const std::size_t rows = 80, inner = 27;
+    std::vector<T> a(rows * inner), x(inner * columns), y(rows * columns);
+    for (T& v : a) v = static_cast<T>(random.uniform(-1, 1));
+    for (T& v : x) v = static_cast<T>(random.uniform(-1, 1));
     multiply(a.data(), rows, inner, x.data(), inner, columns, y.data(), rows);
     for (std::size_t c = 0; c < columns; ++c)
       for (std::size_t r = 0; r < rows; ++r) {
         double sum = 0;
-        for (std::size_t k = 0; k < inner; ++k) sum += a[k * rows + r] * x[c * inner + k];
-        EXPECT_NEAR(y[c * rows + r], sum, 27 * 2.3e-16);
+        for (std::size_t k = 0; k < inner; ++k) sum += static_cast<double>(a[k * rows + r]) * x[c * inner + k];
+        EXPECT_NEAR(y[c * rows + r], sum, 27 * 27 * rounding);
       }
   }
+}
+
+TEST(Multiply, IsThePlainProduct) {
+  // 27 terms of at most 1, and as many roundings of at most 27 halves of epsilon.
+  expectPlainProduct<double>(1.2e-16);
+  expectPlainProduct<float>(6e-8);
 }
 
 /// The slow twin: the whole saddle-point system at once, by LU with full pivoting.
@@ -198,7 +205,7 @@ TEST(DenseSystem, GivesTheSolutionOfTheWholeSystem) {
 
 TEST(Chebyshev, IsExactForPolynomialsOfItsDegreeThroughParentsAndChildren) {
   const Chebyshev parent(6), child(5);
-  const Transfer transfer(parent, child);
+  const Transfer transfer = Transfer::toOctants(parent, child);
   Random random(4);
   const double middle[3] = {1, -2, 3}, half = 2;
   std::vector<double> at_parent(parent.stored(), 0.0), at_child(child.stored(), 0.0);
@@ -209,7 +216,7 @@ TEST(Chebyshev, IsExactForPolynomialsOfItsDegreeThroughParentsAndChildren) {
   for (int a = 0; a < 6; ++a)
     for (int b = 0; b < 6; ++b)
       for (int c = 0; c < 6; ++c) at_parent[n++] = function(parent.root(a), parent.root(b), parent.root(c));
-  transfer.toChild(5, at_parent.data(), at_child.data());  // upper x, lower y, upper z
+  transfer.toFine(5, at_parent.data(), at_child.data());  // upper x, lower y, upper z
   const double child_middle[3] = {2, -3, 4};
   for (int i = 0; i < 50; ++i) {
     const Vec3 p{random.uniform(1, 3), random.uniform(-4, -2), random.uniform(3, 5)};
@@ -228,7 +235,7 @@ TEST(Chebyshev, IsExactForPolynomialsOfItsDegreeThroughParentsAndChildren) {
 
 TEST(Chebyshev, GatheredWeightsHaveThePointsMomentsInTheChildAndItsParent) {
   const Chebyshev parent(4), child(4);
-  const Transfer transfer(parent, child);
+  const Transfer transfer = Transfer::toOctants(parent, child);
   Random random(5);
   std::vector<double> x, y, z, w;
   for (int i = 0; i < 30; ++i)
@@ -237,7 +244,7 @@ TEST(Chebyshev, GatheredWeightsHaveThePointsMomentsInTheChildAndItsParent) {
   const double middle[3] = {0.5, -0.5, 0.5};
   std::vector<double> at_child(child.stored(), 0.0), at_parent(parent.stored(), 0.0);
   child.gather({x.data(), y.data(), z.data(), 30}, w.data(), middle, 0.5, at_child.data());
-  transfer.toParent(5, at_child.data(), at_parent.data());
+  transfer.toCoarse(5, at_child.data(), at_parent.data());
   double wanted = 0, found = 0;
   for (int i = 0; i < 30; ++i)
     wanted += w[static_cast<std::size_t>(i)] * x[static_cast<std::size_t>(i)] * x[static_cast<std::size_t>(i)] *
