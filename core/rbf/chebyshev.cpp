@@ -19,12 +19,12 @@ CubeBasis cubeOf(int p, const std::vector<double>& basis, const double middle[3]
 /// out(a, ., .) = sum_b m(a, b) in(b, ., .), and the axes turned: (a, b, c) -> (b, c, a). Three times is all axes.
 void applyAndTurn(const std::vector<double>& m, std::size_t rows, std::size_t columns, std::size_t rest,
                   const double* in, double* out) {
-  for (std::size_t n = 0; n < rest; ++n) {
-    for (std::size_t a = 0; a < rows; ++a) {
-      double sum = 0;
-      for (std::size_t b = 0; b < columns; ++b) sum += m[a * columns + b] * in[b * rest + n];
-      out[n * rows + a] = sum;
-    }
+  double sums[Chebyshev::kMost * Chebyshev::kMost];
+  for (std::size_t a = 0; a < rows; ++a) {
+    for (std::size_t n = 0; n < rest; ++n) sums[n] = m[a * columns] * in[n];
+    for (std::size_t b = 1; b < columns; ++b)
+      for (std::size_t n = 0; n < rest; ++n) sums[n] += m[a * columns + b] * in[b * rest + n];
+    for (std::size_t n = 0; n < rest; ++n) out[n * rows + a] = sums[n];
   }
 }
 

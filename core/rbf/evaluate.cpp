@@ -94,10 +94,9 @@ std::vector<std::size_t> others(std::size_t count, const std::vector<std::size_t
 
 FastSumOptions optionsOf(const Model& m, double tolerance, double error, unsigned threads, std::size_t points) {
   FastSumOptions o;
-  o.weights = m.weights, o.error = error, o.near_error = 0.1 * tolerance, o.threads = threads;
-  // Measured: few points are best served by small cubes, a million by near sums over large ones.
-  o.leaf_size = points > 200'000 ? 240 : 120;
-  o.target_leaf_size = points > 200'000 ? 1000 : 120;
+  o.weights = m.weights, o.error = error, o.single_error = 0.3 * tolerance, o.threads = threads;
+  // Measured: few points are best served by small cubes, a million by near sums over larger ones.
+  o.target_leaf_size = points > 200'000 ? 400 : 120;
   return o;
 }
 

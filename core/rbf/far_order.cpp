@@ -51,25 +51,44 @@ std::vector<std::uint16_t> turnedNodes(int p, std::size_t turn) {
   return out;
 }
 
-/// Distances from the nodes of a source cube `offset` cubes away to those of the target cube, both of half side 1:
-/// a column of stored() values for each source node.
+double lengthOf(const std::array<int, 3>& offset) {
+  return 2.0 * std::sqrt(offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]);
+}
+
+/// How far each node is in this direction.
+std::vector<double> nodesAlong(const Chebyshev& c, const std::array<int, 3>& offset) {
+  std::vector<double> out;
+  const double length = lengthOf(offset) / 2;
+  for (int i = 0; i < c.nodes(); ++i)
+    for (int j = 0; j < c.nodes(); ++j)
+      for (int k = 0; k < c.nodes(); ++k)
+        out.push_back((offset[0] * c.root(i) + offset[1] * c.root(j) + offset[2] * c.root(k)) / length);
+  return out;
+}
+
+/// What is left of the distances from the nodes of a source cube `offset` cubes away to those of the target cube: a
+/// column of stored() values for each source node.
 template <class T>
-std::vector<T> distancesOf(const Chebyshev& c, const std::array<int, 3>& offset) {
+std::vector<T> restOf(const Chebyshev& c, const std::array<int, 3>& offset, const std::vector<double>& along) {
   const int p = c.nodes();
   std::vector<T> m(c.stored() * c.values(), 0);
   const auto square = [&](std::size_t axis, int source, int target) {
     const double d = 2.0 * offset[axis] + c.root(source) - c.root(target);
     return d * d;
   };
-  T* column = m.data();
+  const double length = lengthOf(offset);
+  std::size_t source = 0;
   for (int s0 = 0; s0 < p; ++s0)
     for (int s1 = 0; s1 < p; ++s1)
-      for (int s2 = 0; s2 < p; ++s2, column += c.stored()) {
-        T* to = column;
+      for (int s2 = 0; s2 < p; ++s2, ++source) {
+        T* to = m.data() + source * c.stored();
+        std::size_t target = 0;
         for (int t0 = 0; t0 < p; ++t0)
           for (int t1 = 0; t1 < p; ++t1)
-            for (int t2 = 0; t2 < p; ++t2)
-              *to++ = static_cast<T>(std::sqrt(square(0, s0, t0) + square(1, s1, t1) + square(2, s2, t2)));
+            for (int t2 = 0; t2 < p; ++t2, ++target) {
+              const double d = std::sqrt(square(0, s0, t0) + square(1, s1, t1) + square(2, s2, t2));
+              *to++ = static_cast<T>(d - length - along[source] + along[target]);
+            }
       }
   return m;
 }
@@ -102,18 +121,22 @@ double farError(int nodes) {
   return kError[static_cast<std::size_t>(nodes)];
 }
 
-FarOrder::FarOrder(int nodes) : chebyshev_(nodes) {
+FarOrder::FarOrder(int nodes, bool single) : chebyshev_(nodes), single_precision_(single) {
   for (std::size_t turn = 0; turn < turns_.size(); ++turn) turns_[turn] = turnedNodes(nodes, turn);
 }
 
 void FarOrder::prepare(int kind) {
   const auto n = static_cast<std::size_t>(kind);
+  if (!along_[n].empty()) return;
+  along_[n] = nodesAlong(chebyshev_, kKinds[n]);
   if (single()) {
-    if (single_[n].empty()) single_[n] = distancesOf<float>(chebyshev_, kKinds[n]);
-  } else if (double_[n].empty()) {
-    double_[n] = distancesOf<double>(chebyshev_, kKinds[n]);
+    single_[n] = restOf<float>(chebyshev_, kKinds[n], along_[n]);
+  } else {
+    double_[n] = restOf<double>(chebyshev_, kKinds[n], along_[n]);
   }
 }
+
+double FarOrder::distance(int kind) const { return lengthOf(kKinds[static_cast<std::size_t>(kind)]); }
 
 void FarOrder::see(int kind, const float* x, std::size_t columns, float* y) const {
   const std::vector<float>& m = single_[static_cast<std::size_t>(kind)];

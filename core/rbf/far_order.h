@@ -25,34 +25,42 @@ struct FarKind {
 /// The root mean square of the error of |x - y|, told by the nodes of two cubes of half side 1 that are two cubes
 /// apart; corners see up to some thirty times as much. @pre Chebyshev::kFewest <= nodes <= kMost.
 [[nodiscard]] double farError(int nodes);
+/// The same of single precision.
+inline constexpr double kFarSingleError = 4e-8;
 
-/// The distances between the nodes of two cubes, for each kind that was asked for.
+/// The distances between the nodes of two cubes, for each kind that was asked for. A distance is the cubes' own, plus
+/// how far the nodes are along the line between them, plus a small rest: only the rest, a tenth as large, is in the
+/// matrices, so that single precision carries further.
 class FarOrder {
  public:
-  explicit FarOrder(int nodes);
+  /// @param single whether the matrices are kept, and multiplied, in single precision.
+  FarOrder(int nodes, bool single);
 
   /// Makes the kind's matrix.
   void prepare(int kind);
 
   [[nodiscard]] const Chebyshev& chebyshev() const { return chebyshev_; }
-  /// Whether single precision is finer than this order: its matrices are kept in single then, else in double.
-  [[nodiscard]] bool single() const { return chebyshev_.nodes() <= kLastSingle; }
+  /// How far apart two cubes of this kind are, and how far node n of a cube is along the line to the other, both cubes
+  /// of half side 1.
+  [[nodiscard]] double distance(int kind) const;
+  [[nodiscard]] const std::vector<double>& along(int kind) const { return along_[static_cast<std::size_t>(kind)]; }
+  [[nodiscard]] bool single() const { return single_precision_; }
   /// Node n of a cube is node turns(turn)[n] of the turned cube.
   [[nodiscard]] const std::vector<std::uint16_t>& turned(int turn) const {
     return turns_[static_cast<std::size_t>(turn)];
   }
 
-  /// y(:, c) = D x(:, c) for cubes of half side 1: columns of values() weights, to columns of stored() sums.
+  /// y(:, c) = R x(:, c) for cubes of half side 1, with R(t, s) = |distance| - distance(kind) - along[s] + along[t]:
+  /// columns of values() weights, to columns of stored() sums.
   /// @pre the kind is prepared, and T is float if single(), else double.
   void see(int kind, const float* x, std::size_t columns, float* y) const;
   void see(int kind, const double* x, std::size_t columns, double* y) const;
 
  private:
-  static constexpr int kLastSingle = 6;
-
   Chebyshev chebyshev_;
+  bool single_precision_;
   std::array<std::vector<std::uint16_t>, FarKind::kTurns> turns_;
-  std::array<std::vector<double>, FarKind::kCount> double_;
+  std::array<std::vector<double>, FarKind::kCount> along_, double_;
   std::array<std::vector<float>, FarKind::kCount> single_;
 };
 

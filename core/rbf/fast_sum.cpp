@@ -79,19 +79,21 @@ FastSum::FastSum(std::span<const Vec3> sources, std::span<const Vec3> targets, c
   // Where no source is near, a target's cube need not be small; deeper than the sources' leaves brings nothing.
   targets_ =
       same ? sources_ : std::make_shared<const Octree>(targets, root, options.target_leaf_size, sources_->depth());
-  const std::vector<int> nodes = nodesOfLevels(std::max(sources_->depth(), targets_->depth()) + 1);
-  const std::size_t few = static_cast<std::size_t>(nodes.back()) * static_cast<std::size_t>(nodes.back()) *
-                          static_cast<std::size_t>(nodes.back());
+  const Orders orders = chooseOrders(std::max(sources_->depth(), targets_->depth()) + 1);
+  const auto last = static_cast<std::size_t>(orders.nodes.back());
+  const std::size_t few = last * last * last;
   seen_ = interactionsOf(*targets_, *sources_, few, few * few / kPairOfNodes);
-  makeLevels(nodes);
+  makeLevels(orders);
   up_first_ = offsetsOf(*sources_), down_first_ = offsetsOf(*targets_);
   options_.weights = {};
 }
 
-std::vector<int> FastSum::nodesOfLevels(int levels) const {
-  std::vector<int> out;
+FastSum::Orders FastSum::chooseOrders(int levels) const {
+  Orders out;
   for (int level = 0; level < levels; ++level)
-    out.push_back(std::max(std::min(kFewestByRule, options_.nodes), options_.nodes - std::max(0, level - kFirstFar)));
+    out.nodes.push_back(
+        std::max(std::min(kFewestByRule, options_.nodes), options_.nodes - std::max(0, level - kFirstFar)));
+  out.single = std::isinf(options_.single_error);
   if (options_.weights.empty()) return out;
   // A pair of cubes is wrong by farError of half the cube's side and the root of the sum of the weights' squares, since
   // the errors of a cube's points are as often positive as negative; the heaviest cube of each level decides. Three
@@ -104,22 +106,25 @@ std::vector<int> FastSum::nodesOfLevels(int levels) const {
     double& most = heaviest[static_cast<std::size_t>(node.level)];
     most = std::max(most, squares);
   }
+  double single_error = 0;
   const double share = options_.error / std::sqrt(std::max(1, levels - kFirstFar));
-  for (int level = 0; level < levels; ++level) {
-    const double weight =
-        3 * sources_->halfOf(level) * std::sqrt(heaviest[static_cast<std::size_t>(std::max(level, kFirstFar))]);
-    int& nodes = out[static_cast<std::size_t>(level)];
-    nodes = Chebyshev::kFewest;
-    while (nodes < Chebyshev::kMost && farError(nodes) * weight > share) ++nodes;
+  for (int level = kFirstFar; level < levels; ++level) {
+    const auto n = static_cast<std::size_t>(level);
+    const double weight = 3 * sources_->halfOf(level) * std::sqrt(heaviest[n]);
+    out.nodes[n] = Chebyshev::kFewest;
+    while (out.nodes[n] < Chebyshev::kMost && farError(out.nodes[n]) * weight > share) ++out.nodes[n];
+    single_error = std::hypot(single_error, kFarSingleError * weight);
   }
+  out.single = single_error <= options_.single_error;
   return out;
 }
 
-void FastSum::makeLevels(const std::vector<int>& nodes) {
+void FastSum::makeLevels(const Orders& chosen) {
+  const std::vector<int>& nodes = chosen.nodes;
   std::array<std::shared_ptr<FarOrder>, Chebyshev::kMost + 1> orders;
   const auto orderOf = [&](int n) -> const std::shared_ptr<FarOrder>& {
     std::shared_ptr<FarOrder>& order = orders[static_cast<std::size_t>(n)];
-    if (order == nullptr) order = std::make_shared<FarOrder>(n);
+    if (order == nullptr) order = std::make_shared<FarOrder>(n, chosen.single);
     return order;
   };
   for (std::size_t n = 0; n < nodes.size(); ++n) {
@@ -196,13 +201,21 @@ void FastSum::farColumns(std::size_t from, std::size_t columns, const Values& up
   const FarOrder& order = *level.orders[part];
   const std::size_t stored = order.chebyshev().stored(), count = order.chebyshev().values();
   const double scale = sources_->halfOf(first.level);
+  const std::vector<double>& along = order.along(kind);
   x.resize(count * kColumns), y.resize(stored * kColumns);
+  std::array<double, kColumns> sum, reach;  // of the weights, and of weights times how far their nodes are
   for (std::size_t c = 0; c < columns; ++c) {
     const Interactions::FarPair& pair = seen_.far[from + c];
     const double* const source = up.data() + up_first_[pair.source] + level.first[part];
     const std::vector<std::uint16_t>& turned = order.turned(pair.kind.turn);
     T* const to = x.data() + c * count;
-    for (std::size_t n = 0; n < count; ++n) to[turned[n]] = static_cast<T>(scale * source[n]);
+    double weights = 0, moment = 0;
+    for (std::size_t n = 0; n < count; ++n) {
+      const double w = scale * source[n];
+      to[turned[n]] = static_cast<T>(w);
+      weights += w, moment += w * along[turned[n]];
+    }
+    sum[c] = weights, reach[c] = moment + weights * order.distance(kind);
   }
   order.see(kind, x.data(), columns, y.data());
   for (std::size_t c = 0; c < columns; ++c) {
@@ -210,7 +223,8 @@ void FastSum::farColumns(std::size_t from, std::size_t columns, const Values& up
     double* const target = down.data() + down_first_[pair.target] + level.first[part];
     const std::vector<std::uint16_t>& turned = order.turned(pair.kind.turn);
     const T* const result = y.data() + c * stored;
-    for (std::size_t n = 0; n < count; ++n) target[n] += static_cast<double>(result[turned[n]]);
+    for (std::size_t n = 0; n < count; ++n)
+      target[n] += static_cast<double>(result[turned[n]]) + (reach[c] - sum[c] * along[turned[n]]);
   }
 }
 
@@ -290,15 +304,15 @@ void FastSum::eachLeaf(const Values& up, std::span<const double> weights, const 
         const OctreeNode& source = sources_->nodes()[near.source[i]];
         wide.add(sources_->points(source), weights.data() + source.first, middle);
       }
-      if (options_.near_error > 0 && singleError(wide, targets_->halfOf(node.level)) <= options_.near_error) {
-        narrow.addAll(wide);
-        wide.clear();
-      }
       for (std::uint32_t i = from_nodes.first[n]; i < from_nodes.first[n + 1]; ++i) {
         const std::size_t source = from_nodes.source[i];
         const OctreeNode& cube = sources_->nodes()[source];
         const Gathered<double> at = nodesOf(chebyshevOf(cube), *sources_, cube);
         wide.add(at.points(), up.data() + up_first_[source], middle);
+      }
+      if (options_.single_error > 0 && singleError(wide, targets_->halfOf(node.level)) <= options_.single_error) {
+        narrow.addAll(wide);
+        wide.clear();
       }
       use(n, middle, wide, narrow);
     }

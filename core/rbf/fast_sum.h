@@ -21,8 +21,9 @@ struct FastSumOptions {
   /// Not empty: instead, each level has as many as keep the sums of these source weights within about `error`.
   std::span<const double> weights;
   double error = 0;
-  /// A leaf's near pairs are in single precision, three times as fast, where that is expected to move no sum by more.
-  double near_error = 0;
+  /// Single precision, three times as fast for near pairs and twice for far ones, is used where it is expected to move
+  /// no sum by more; without weights to tell by, for far ones only if this is infinite.
+  double single_error = 0;
   std::size_t leaf_size = 120;         ///< a source cube is split while it holds more
   std::size_t target_leaf_size = 120;  ///< and a target cube
   unsigned threads = 0;
@@ -58,8 +59,13 @@ class FastSum {
   using Values = std::vector<double>;
   using Offsets = std::vector<std::size_t>;  ///< where each node's values begin
 
-  [[nodiscard]] std::vector<int> nodesOfLevels(int levels) const;
-  void makeLevels(const std::vector<int>& nodes_of_levels);
+  /// How many nodes an axis each level has, and whether far pairs are in single precision.
+  struct Orders {
+    std::vector<int> nodes;
+    bool single = true;
+  };
+  [[nodiscard]] Orders chooseOrders(int levels) const;
+  void makeLevels(const Orders& orders);
   [[nodiscard]] const Level& levelOf(const OctreeNode& node) const {
     return levels_[static_cast<std::size_t>(node.level)];
   }

@@ -70,7 +70,7 @@ Result<Preconditioner> Preconditioner::make(std::span<const Vec3> points, double
   out.basis_ = polynomialBasis(points);
   const std::vector<Vec3> kept = chosen(points, out.kept_);
   FastSumOptions rough;  // the answer is only a direction to search in
-  rough.nodes = 4, rough.near_error = std::numeric_limits<double>::infinity(), rough.threads = threads;
+  rough.nodes = 4, rough.single_error = std::numeric_limits<double>::infinity(), rough.threads = threads;
   out.to_kept_ = std::make_unique<FastSum>(points, kept, rough);
   if (auto ok = out.factorBoxes(points, std::move(domains)); !ok) return tl::unexpected(ok.error());
   auto coarse = System::make(kept, ridge, threads, System::Use::Roughly);

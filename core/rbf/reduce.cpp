@@ -54,7 +54,7 @@ std::vector<double> missed(std::span<const Vec3> points, std::span<const double>
                            unsigned threads) {
   FastSumOptions options;
   options.threads = threads;
-  options.weights = s.weights, options.error = 0.1 * tolerance, options.near_error = 0.1 * tolerance;
+  options.weights = s.weights, options.error = 0.1 * tolerance, options.single_error = 0.1 * tolerance;
   const FastSum sum(centres, points, options);
   std::vector<double> out(points.size());
   sum.values(s.weights, out);

@@ -43,7 +43,7 @@ std::vector<double> exactResidual(const std::vector<Vec3>& points, double ridge,
 FastSumOptions sumOptions(int nodes, bool single, unsigned threads) {
   FastSumOptions options;
   options.nodes = nodes, options.threads = threads, options.leaf_size = 200;
-  options.near_error = single ? std::numeric_limits<double>::infinity() : 0;
+  options.single_error = single ? std::numeric_limits<double>::infinity() : 0;
   return options;
 }
 

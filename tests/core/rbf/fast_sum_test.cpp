@@ -115,7 +115,7 @@ TEST(FastSum, HasTheSameBitsFromAnyNumberOfThreadsAndNearTheDirectSumInSinglePre
   FastSumOptions one = small(7), three = one;
   one.threads = 1, three.threads = 3;
   EXPECT_EQ(sums(set, set, one).fast, sums(set, set, three).fast);
-  one.near_error = std::numeric_limits<double>::infinity();
+  one.single_error = std::numeric_limits<double>::infinity();
   const Sums s = sums(set, set, one);
   EXPECT_LT(s.error(), 2 * 5e-6 * s.weight * 40);
 }
