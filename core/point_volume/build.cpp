@@ -11,7 +11,7 @@ namespace spinaltap::point_volume {
 namespace {
 
 constexpr std::uint32_t kFewPoints = 24;  // below this, halving costs about what it saves
-constexpr std::size_t kBatch = 8192;      // points in one call of the field or the sampler
+constexpr std::size_t kBatch = 65'536;    // points in one call of the field or the sampler
 constexpr std::int64_t kTurn = 1 << 24;   // angles as integers, so that every slot falls in one block
 constexpr double kSlack_mm = 1e-6;        // rounding in block centres, and in the field itself
 

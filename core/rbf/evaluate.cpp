@@ -15,9 +15,12 @@ namespace {
 constexpr std::size_t kBlock = 64;                   // points that one thread takes at a time
 constexpr std::size_t kWorthAThread = 200'000;       // pairs
 constexpr std::size_t kWorthFastSums = 4'000'000;    // pairs: below, planning costs more than it saves
+constexpr double kPreparedRadii = 1.25;              // points nearer have sums prepared for them
 constexpr double kFarRadii = 4;                      // farther points are summed directly
 constexpr std::size_t kFewCentres = 250;             // sums of fewer are always direct
 constexpr std::size_t kCrowds = 24, kInACrowd = 12;  // places at which sums are tried out
+// Of the tolerance, what they may use there: of a million other places, the worst was wrong by three times as much.
+constexpr double kAtTrials = 0.2;
 
 unsigned usefulThreads(const Model& model, std::size_t points, unsigned threads) {
   return std::uint64_t{points} * (model.centres.size() + 1) < kWorthAThread ? 1 : threads;
@@ -54,12 +57,17 @@ void directSlopes(const Model& m, const Coordinates& centres, const Coordinates&
   });
 }
 
-/// Which of the points fast sums may take.
-std::vector<std::size_t> nearPoints(const Model& m, std::span<const Vec3> points) {
+/// Points by how their sums are best found.
+struct Regions {
+  std::vector<std::size_t> near, around, far;  ///< within the prepared cube, within fast sums' reach, and beyond
+};
+
+Regions regionsOf(const Model& m, const RootCube& prepared, std::span<const Vec3> points) {
   const double reach = kFarRadii * std::max(m.radius_mm, std::numeric_limits<double>::min());
-  std::vector<std::size_t> out;
+  Regions out;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (norm(points[i] - m.centroid_patient) <= reach) out.push_back(i);
+    const Vec3 p = points[i] - m.centroid_patient;
+    (prepared.holds(p) ? out.near : norm(p) <= reach ? out.around : out.far).push_back(i);
   }
   return out;
 }
@@ -78,23 +86,9 @@ std::vector<Vec3> chosenOf(std::span<const Vec3> points, const std::vector<std::
   return out;
 }
 
-/// Points that are not chosen.
-std::vector<std::size_t> others(std::size_t count, const std::vector<std::size_t>& chosen) {
-  std::vector<std::size_t> out;
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (next < chosen.size() && chosen[next] == i) {
-      ++next;
-    } else {
-      out.push_back(i);
-    }
-  }
-  return out;
-}
-
 FastSumOptions optionsOf(const Model& m, double tolerance, double error, unsigned threads, std::size_t points) {
   FastSumOptions o;
-  o.weights = m.weights, o.error = error, o.single_error = 0.3 * tolerance, o.threads = threads;
+  o.weights = m.weights, o.error = error, o.single_error = 0.03 * tolerance, o.threads = threads;
   // Measured: few points are best served by small cubes, a million by near sums over larger ones.
   o.target_leaf_size = points > 200'000 ? 400 : 120;
   return o;
@@ -104,13 +98,14 @@ FastSumOptions optionsOf(const Model& m, double tolerance, double error, unsigne
 /// other, and for the rest around every n-th centre and anywhere in the ball.
 std::vector<Vec3> trialPlaces(const Model& m) {
   const std::size_t n = m.centres.size();
+  const RootCube root = RootCube::around(m.centres);
   std::vector<std::size_t> by_weight(n);
   for (std::size_t i = 0; i < n; ++i) by_weight[i] = i;
   std::sort(by_weight.begin(), by_weight.end(), [&](std::size_t a, std::size_t b) {
     const double wa = std::abs(m.weights[a]), wb = std::abs(m.weights[b]);
     return wa != wb ? wa > wb : a < b;
   });
-  const double apart = 0.1 * m.radius_mm;
+  const double apart = 0.1 * root.half;
   std::vector<Vec3> crowds;
   for (std::size_t k = 0; k < n && crowds.size() < kCrowds / 2; ++k) {
     const Vec3& c = m.centres[by_weight[k]];
@@ -119,8 +114,8 @@ std::vector<Vec3> trialPlaces(const Model& m) {
   }
   Random random(n);
   while (crowds.size() < kCrowds) {
-    const Vec3 anywhere = Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * m.radius_mm;
-    crowds.push_back(crowds.size() % 2 == 0 ? m.centres[crowds.size() * n / kCrowds] : anywhere);
+    const Vec3 anywhere = Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} * root.half;
+    crowds.push_back(crowds.size() % 2 == 0 ? m.centres[crowds.size() * n / kCrowds] : root.middle + anywhere);
   }
   std::vector<Vec3> places;
   for (const Vec3& crowd : crowds) {
@@ -152,6 +147,19 @@ void evaluateGradient(const Model& model, std::span<const Vec3> points, std::spa
   }
 }
 
+struct Evaluator::Prepared {
+  FastSources sources;
+  FastSources::Weighted weighted;
+
+  static RootCube around(const Model& m) {
+    RootCube root = RootCube::around(m.centres);
+    root.half *= kPreparedRadii;
+    return root;
+  }
+  Prepared(const Model& m, const FastSumOptions& options)
+      : sources(m.centres, around(m), options), weighted(sources.weigh(m.weights)) {}
+};
+
 Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads)
     : model_(std::move(model)), tolerance_(tolerance_mm), threads_(threads) {
   assert(tolerance_mm > 0);
@@ -160,54 +168,73 @@ Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads)
   const Coordinates at(places), centres(model_.centres);
   std::vector<double> direct(places.size()), fast(places.size());
   directSums(model_, centres, at, direct, threads_);
-  // A third of the tolerance leaves room for places not tried.
-  for (double error = 0.1 * tolerance_mm; error > 1e-4 * tolerance_mm; error *= 0.25) {
+  for (double error = 0.1 * tolerance_mm; error > 1e-4 * tolerance_mm; error *= 0.3) {
     FastSumOptions options = optionsOf(model_, tolerance_, error, threads_, 0);
     options.target_leaf_size = 2;  // cubes as small as those of many points
     FastSum(model_.centres, places, options).values(model_.weights, fast);
     double most = 0;
     for (std::size_t k = 0; k < places.size(); ++k) most = std::max(most, std::abs(fast[k] - direct[k]));
-    if (!(most <= 0.3 * tolerance_mm)) continue;
+    if (!(most <= kAtTrials * tolerance_mm)) continue;
     error_ = error;
+    prepared_ = std::make_shared<const Prepared>(model_, optionsOf(model_, tolerance_, error_, threads_, 0));
     return;
   }
 }
 
-void Evaluator::values(std::span<const Vec3> points, std::span<double> out) const {
-  if (error_ == 0 || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
-    return evaluate(model_, points, out, threads_);
-  const std::vector<std::size_t> near = nearPoints(model_, points);
-  if (!near.empty()) {
-    const std::vector<Vec3> at = relative(model_, points, near);
-    std::vector<double> sums(at.size());
-    FastSum(model_.centres, at, optionsOf(model_, tolerance_, error_, threads_, at.size()))
-        .values(model_.weights, sums);
-    for (std::size_t n = 0; n < near.size(); ++n) out[near[n]] = finished(model_, at[n], sums[n]);
+/// use(chosen points, their places relative to the centroid, their sum) for those within reach of fast sums, and
+/// direct(chosen points) for the others.
+template <class Use, class Direct>
+void Evaluator::split(std::span<const Vec3> points, const Use& use, const Direct& direct) const {
+  const Regions regions = regionsOf(model_, prepared_->sources.tree().root(), points);
+  if (!regions.near.empty()) {
+    const std::vector<Vec3> at = relative(model_, points, regions.near);
+    use(regions.near, at,
+        FastSum({prepared_, &prepared_->sources}, at, optionsOf(model_, tolerance_, error_, threads_, at.size())),
+        prepared_->weighted);
   }
-  const std::vector<std::size_t> far = others(points.size(), near);
-  if (far.empty()) return;
-  std::vector<double> s(far.size());
-  evaluate(model_, chosenOf(points, far), s, threads_);
-  for (std::size_t n = 0; n < far.size(); ++n) out[far[n]] = s[n];
+  if (!regions.around.empty()) {
+    const std::vector<Vec3> at = relative(model_, points, regions.around);
+    const FastSumOptions options = optionsOf(model_, tolerance_, error_, threads_, at.size());
+    const auto sources =
+        std::make_shared<const FastSources>(model_.centres, RootCube::around(model_.centres, at), options);
+    use(regions.around, at, FastSum(sources, at, options), sources->weigh(model_.weights));
+  }
+  if (!regions.far.empty()) direct(regions.far);
+}
+
+void Evaluator::values(std::span<const Vec3> points, std::span<double> out) const {
+  if (prepared_ == nullptr || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
+    return evaluate(model_, points, out, threads_);
+  split(
+      points,
+      [&](const auto& chosen, const auto& at, const FastSum& sum, const FastSources::Weighted& weighted) {
+        std::vector<double> sums(at.size());
+        sum.values(weighted, sums);
+        for (std::size_t n = 0; n < at.size(); ++n) out[chosen[n]] = finished(model_, at[n], sums[n]);
+      },
+      [&](const auto& chosen) {
+        std::vector<double> s(chosen.size());
+        evaluate(model_, chosenOf(points, chosen), s, threads_);
+        for (std::size_t n = 0; n < chosen.size(); ++n) out[chosen[n]] = s[n];
+      });
 }
 
 void Evaluator::gradients(std::span<const Vec3> points, std::span<Vec3> out) const {
-  if (error_ == 0 || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
+  if (prepared_ == nullptr || std::uint64_t{points.size()} * model_.centres.size() < kWorthFastSums)
     return evaluateGradient(model_, points, out, threads_);
-  const std::vector<std::size_t> near = nearPoints(model_, points);
-  if (!near.empty()) {
-    const std::vector<Vec3> at = relative(model_, points, near);
-    std::vector<Vec3> slopes(at.size());
-    const FastSum sum(model_.centres, at, optionsOf(model_, tolerance_, error_, threads_, at.size()));
-    sum.gradients(model_.weights, slopes);
-    for (std::size_t n = 0; n < near.size(); ++n) out[near[n]] = slopes[n] + model_.linear;
-    pointAwayBeyond(at, near, points, out);
-  }
-  const std::vector<std::size_t> far = others(points.size(), near);
-  if (far.empty()) return;
-  std::vector<Vec3> slopes(far.size());
-  evaluateGradient(model_, chosenOf(points, far), slopes, threads_);
-  for (std::size_t n = 0; n < far.size(); ++n) out[far[n]] = slopes[n];
+  split(
+      points,
+      [&](const auto& chosen, const auto& at, const FastSum& sum, const FastSources::Weighted& weighted) {
+        std::vector<Vec3> slopes(at.size());
+        sum.gradients(weighted, slopes);
+        for (std::size_t n = 0; n < at.size(); ++n) out[chosen[n]] = slopes[n] + model_.linear;
+        pointAwayBeyond(at, chosen, points, out);
+      },
+      [&](const auto& chosen) {
+        std::vector<Vec3> slopes(chosen.size());
+        evaluateGradient(model_, chosenOf(points, chosen), slopes, threads_);
+        for (std::size_t n = 0; n < chosen.size(); ++n) out[chosen[n]] = slopes[n];
+      });
 }
 
 void Evaluator::pointAwayBeyond(std::span<const Vec3> at, std::span<const std::size_t> near,
