@@ -136,13 +136,22 @@ std::optional<Vec3> findCanal(const Scene& scene, const Body& body, double thres
 
 ColumnDepth depthIn(const Body& body, const Vec3& local) {
   const Vec3 p = body.frame.toPatient(local);
-  const double plates = std::min(dot(body.top.middle - p, body.top.up), dot(p - body.bottom.middle, body.bottom.up));
+  const double below_top = dot(body.top.middle - p, body.top.up),
+               over_bottom = dot(p - body.bottom.middle, body.bottom.up);
   const double turn = std::atan2(local.y, local.x) / (2 * kPi) * kOutlineRays;
   const double ray = turn < 0 ? turn + kOutlineRays : turn;
   const auto low = static_cast<std::size_t>(ray);
   const double t = ray - static_cast<double>(low);
-  const double wall = (1 - t) * body.outline_mm[low % kOutlineRays] + t * body.outline_mm[(low + 1) % kOutlineRays];
-  return {wall - std::sqrt(local.x * local.x + local.y * local.y), plates};
+  const auto wallAt = [&](int level) {
+    const Outline& o = body.level_mm[static_cast<std::size_t>(level)];
+    return (1 - t) * o[low % kOutlineRays] + t * o[(low + 1) % kOutlineRays];
+  };
+  const double part = over_bottom / std::max(1.0, below_top + over_bottom);
+  const double level =
+      std::clamp((part - partOfLevel(0)) / (partOfLevel(1) - partOfLevel(0)), 0.0, kOutlineLevels - 1.0);
+  const int under = std::min(static_cast<int>(level), kOutlineLevels - 2);
+  const double wall = wallAt(under) + (level - under) * (wallAt(under + 1) - wallAt(under));
+  return {wall - std::sqrt(local.x * local.x + local.y * local.y), std::min(below_top, over_bottom)};
 }
 
 std::optional<Body> findBody(const Scene& scene, const Vec3& inside, const Vec3& up) {

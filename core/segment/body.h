@@ -17,6 +17,11 @@ struct EndPlate {
 };
 
 inline constexpr int kOutlineRays = 72;
+inline constexpr int kOutlineLevels = 7;
+using Outline = std::array<double, kOutlineRays>;
+
+/// Level n lies at this part of the way from the bottom plate to the top plate.
+[[nodiscard]] inline constexpr double partOfLevel(int n) { return 0.08 + 0.14 * n; }
 
 struct Body {
   EndPlate top, bottom;
@@ -24,7 +29,9 @@ struct Body {
   Frame frame;
   double height_mm = 0;
   /// From the axis to the wall below the pedicles, every 360 / kOutlineRays degrees from left over back.
-  std::array<double, kOutlineRays> outline_mm{};
+  Outline outline_mm{};
+  /// The same at each level: a body is waisted, and its rims flare beyond the waist by up to a fifth of its width.
+  std::array<Outline, kOutlineLevels> level_mm{};
   double half_width_mm = 0;   ///< left to right
   double back_mm = 0;         ///< from the axis to the wall before the canal
   double soft_hu = 0;         ///< beside the wall

@@ -1,8 +1,8 @@
 // core/segment/isolate.h - one vertebra out of a CT with neighbours, from one click.
 //
 // From a place in the wanted vertebral body the plates and walls of that body are found, then its neighbours' bodies
-// and the canal. Bodies, pedicles and laminae seed a competition in which each vertebra floods the bone at a cost that
-// dark voxels and joint spaces raise; what the wanted one wins is bounded on the CT's own grid and filled.
+// and the canal. Bodies, and what of their arches is sure, seed a competition in which each vertebra floods the bone at
+// a cost that dark voxels and joint spaces raise; what the wanted one wins is bounded on the CT's own grid and filled.
 #pragma once
 #include <functional>
 #include <string_view>

@@ -45,6 +45,11 @@ double wallAt(const std::array<double, kRaySteps>& ray, int step) {
   return std::clamp(at(ray, step - 2) - at(ray, step + 3), -kMostDrop_hu, kMostDrop_hu);
 }
 
+/// From where to where a path may run on each ray, mm.
+struct Band {
+  Outline least{}, most{};
+};
+
 double radiusOf(const Ellipse& e, const SinCos& a) {
   return e.half_width * e.half_depth /
          std::sqrt(e.half_depth * e.half_depth * a.cos * a.cos + e.half_width * e.half_width * a.sin * a.sin);
@@ -52,14 +57,14 @@ double radiusOf(const Ellipse& e, const SinCos& a) {
 
 /// The closed path of steps with the largest sum of walls, neighbours at most 1 mm apart: three times round, so that
 /// the middle turn closes on itself.
-std::array<double, kOutlineRays> closedWall(const Polar& polar, const Ellipse& near) {
+Outline closedWall(const Polar& polar, const Band& band) {
   constexpr std::size_t kRays = 3 * std::size_t{kOutlineRays};
   constexpr int kMostJump = 2;
   std::vector<std::array<double, kRaySteps>> sum(kRays);
   std::vector<std::array<int, kRaySteps>> from(kRays);
   for (std::size_t n = 0; n < sum.size(); ++n) {
     const auto& ray = polar[n % kOutlineRays];
-    const double expected = radiusOf(near, angleOf(n % kOutlineRays));
+    const double least = band.least[n % kOutlineRays], most = band.most[n % kOutlineRays];
     for (int s = 0; s < kRaySteps; ++s) {
       double best = n == 0 ? 0 : -1e300;
       int best_from = s;
@@ -68,14 +73,15 @@ std::array<double, kOutlineRays> closedWall(const Polar& polar, const Ellipse& n
         const double here = sum[n - 1][static_cast<std::size_t>(q)] - 10.0 * (q - s) * (q - s);
         if (here > best) best = here, best_from = q;
       }
-      const bool far = std::abs(kNearest_mm + s * kRayStep_mm - expected) > 0.3 * expected;
+      const double r = kNearest_mm + s * kRayStep_mm;
+      const bool far = r < least || r > most;
       sum[n][static_cast<std::size_t>(s)] = best + (far ? -kMostDrop_hu : wallAt(ray, s));
       from[n][static_cast<std::size_t>(s)] = best_from;
     }
   }
   const auto& last = sum.back();
   auto s = static_cast<int>(std::max_element(last.begin(), last.end()) - last.begin());
-  std::array<double, kOutlineRays> out{};
+  Outline out{};
   for (std::size_t n = sum.size(); n-- > 0;) {
     if (n / kOutlineRays == 1) out[n % kOutlineRays] = kNearest_mm + s * kRayStep_mm;
     s = from[n][static_cast<std::size_t>(s)];
@@ -102,11 +108,66 @@ void measureWall(const Polar& polar, Body& body) {
   body.soft_hu = medianOf(soft), body.wall_hu = medianOf(wall);
 }
 
+/// Height in the body's frame of a plane that passes through a plate.
+struct PlateHeight {
+  Vec3 middle, up;
+
+  PlateHeight(const Frame& frame, const EndPlate& plate)
+      : middle(frame.toLocal(plate.middle)), up(transposeTimes(frame.axes, plate.up)) {}
+  [[nodiscard]] double over(double x, double y) const {
+    return middle.z - (up.x * (x - middle.x) + up.y * (y - middle.y)) / up.z;
+  }
+};
+
+/// Mean HU by angle and distance at one level, over a tenth of the height: a wedge's levels follow its plates.
+Polar polarAtLevel(const Scene& scene, const Body& body, double part) {
+  constexpr double kOff[5] = {-0.06, -0.03, 0, 0.03, 0.06};
+  const PlateHeight top(body.frame, body.top), bottom(body.frame, body.bottom);
+  Polar polar{};
+  for (std::size_t ray = 0; ray < kOutlineRays; ++ray) {
+    const SinCos a = angleOf(ray);
+    for (int step = 0; step < kRaySteps; ++step) {
+      const double r = kNearest_mm + step * kRayStep_mm, x = r * a.cos, y = r * a.sin;
+      const double low = bottom.over(x, y), high = top.over(x, y);
+      for (const double off : kOff) {
+        const Vec3 p{x, y, low + (part + off) * (high - low)};
+        polar[ray][static_cast<std::size_t>(step)] += 0.2 * valueAt(scene.block, scene.smooth, body.frame.toPatient(p));
+      }
+    }
+  }
+  return polar;
+}
+
+/// From the waist to each rim, level by level. A rim flares by no more than 45 degrees or so; at the back, where
+/// pedicles leave the body, no wall is to be seen and the waist's stands for it.
+void traceLevels(const Scene& scene, Body& body) {
+  constexpr int kWaist = 2;
+  constexpr double kBack = 0.3;  // sine of the angle from left or right
+  const double flare = (partOfLevel(1) - partOfLevel(0)) * body.height_mm;
+  const auto trace = [&](int level, const Outline& from) {
+    Band band{from, from};
+    for (std::size_t ray = 0; ray < kOutlineRays; ++ray) {
+      const double loose = angleOf(ray).sin > kBack ? 0.5 * kRayStep_mm : flare;
+      band.least[ray] -= loose, band.most[ray] += loose;
+    }
+    body.level_mm[static_cast<std::size_t>(level)] = closedWall(polarAtLevel(scene, body, partOfLevel(level)), band);
+  };
+  trace(kWaist, body.outline_mm);
+  for (int n = kWaist - 1; n >= 0; --n) trace(n, body.level_mm[static_cast<std::size_t>(n + 1)]);
+  for (int n = kWaist + 1; n < kOutlineLevels; ++n) trace(n, body.level_mm[static_cast<std::size_t>(n - 1)]);
+}
+
 }  // namespace
 
 void traceOutline(const Scene& scene, const Ellipse& near, Body& body) {
   const double low = -0.3 * body.height_mm, high = 0.02 * body.height_mm;
-  body.outline_mm = closedWall(polarMean(scene.block, scene.smooth, body.frame, low, high), near);
+  Band band;
+  for (std::size_t ray = 0; ray < kOutlineRays; ++ray) {
+    const double expected = radiusOf(near, angleOf(ray));
+    band.least[ray] = 0.7 * expected, band.most[ray] = 1.3 * expected;
+  }
+  body.outline_mm = closedWall(polarMean(scene.block, scene.smooth, body.frame, low, high), band);
+  traceLevels(scene, body);
   measureWall(polarMean(scene.block, scene.block.hu, body.frame, low, high), body);
   const auto towards = [&](int degrees) {
     return body.outline_mm[static_cast<std::size_t>(degrees * kOutlineRays / 360)];

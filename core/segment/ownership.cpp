@@ -18,6 +18,12 @@ constexpr double kSpan = 2.6;  // half the span of the transverse processes is a
 // From pedicle to facet it is shorter than from lamina to facet by about this. Where a joint space cannot be seen at
 // all two floods meet midway, so the pedicles set out later.
 constexpr std::uint16_t kPedicleStart = 14 * kUnit;
+// A flood from the pedicle is at the transverse process's root about then: so seeds there hold the process itself, yet
+// no joint is reached sooner than without them.
+constexpr std::uint16_t kProcessStart = kPedicleStart + 26 * kUnit;
+// Joints lie the farther apart the lower they are (the last ones some 45 mm), so L5 comes late to those with the
+// sacrum.
+constexpr std::uint16_t kSacrumStart = 30 * kUnit;
 
 std::vector<std::uint16_t> costs(const Scene& scene, const std::vector<float>& hu, double threshold_hu) {
   const std::vector<float> softer = blurred(scene.block, scene.block.hu, 0.8, scene.threads);
@@ -40,13 +46,26 @@ bool inPedicle(const Body& body, const Vec3& canal, const Vec3& p) {
          p.z < 0.4 * body.height_mm;
 }
 
+/// A place behind a body, in the body's own measures: aside of and behind the canal's middle in half widths, over the
+/// body's middle in heights.
+struct Behind {
+  double aside, back, over;
+};
+
+/// The lamina where it roofs the canal, below the pedicles, in front of where the upper neighbour's processes hang.
+bool isLamina(const Behind& p) { return p.over > -0.25 && p.over < -0.1 && p.aside < 0.4 && p.back < 0.45; }
+/// Beside the pedicles nothing but the root of the transverse process and the pars: facets lie nearer to the midline.
+bool isProcessRoot(const Behind& p) { return std::abs(p.over) < 0.2 && p.aside > 1 && p.aside < 1.8; }
+/// In front of the joints behind the lower disc, and a body's height below: never the wanted one's.
+bool isUnder(const Behind& p) { return p.over < -1.35 || (p.over < -0.75 && p.back < 0.05); }
+
 class Seeds {
  public:
   Seeds(const Scene& scene, const std::vector<float>& hu, double threshold_hu, Flood& flood)
       : scene_(scene), hu_(hu), threshold_hu_(threshold_hu), flood_(flood) {}
 
-  /// The column between the plates, and the pedicles. Of a likeness only what is bone.
-  void sowBody(const Body& body, std::uint8_t owner, bool only_bone) {
+  /// The column between the plates, and the pedicles where they are to be trusted. Of a likeness only what is bone.
+  void sowBody(const Body& body, std::uint8_t owner, bool is_likeness, bool pedicles) {
     const Block& block = scene_.block;
     const Vec3 canal = body.canal ? body.frame.toLocal(*body.canal) : Vec3{};
     std::size_t v = 0;
@@ -56,14 +75,30 @@ class Seeds {
           const Vec3 p = body.frame.toLocal(block.place(i, j, k));
           if (std::abs(p.z) > body.height_mm || block.known[v] == 0) continue;
           const bool bone = hu_[v] > threshold_hu_;
-          const bool column = (bone || !only_bone) && depthIn(body, p).least() > kSeedDepth_mm;
-          if (!column && !(bone && body.canal && inPedicle(body, canal, p))) continue;
+          const bool column = (bone || !is_likeness) && depthIn(body, p).least() > kSeedDepth_mm;
+          if (!column && !(pedicles && bone && body.canal && inPedicle(body, canal, p))) continue;
           flood_.owner[v] = owner;
           flood_.start[v] = kPedicleStart;
           if (column) flood_.cost[v] = kUnit;  // marrow may be dark
         }
       }
     }
+  }
+
+  /// What of the arch is sure to be the body's own.
+  void sowArch(const Body& body, std::uint8_t owner) {
+    eachBehind(body, [&](std::size_t v, const Behind& at) {
+      if (isLamina(at)) sow(v, owner, 0);
+      if (isProcessRoot(at)) sow(v, owner, kProcessStart);
+    });
+  }
+
+  /// Where the lower neighbour was not found: the places that are sure not to be the wanted one's. @param wanted  its
+  /// measures are used, for a likeness's pedicles and lamina may lie anywhere.
+  void sowUnder(const Body& wanted, std::uint16_t start) {
+    eachBehind(wanted, [&](std::size_t v, const Behind& at) {
+      if (isUnder(at)) sow(v, kBelow, start);
+    });
   }
 
   /// Bone too far to the side for a transverse process: ribs, ilium.
@@ -93,6 +128,28 @@ class Seeds {
   }
 
  private:
+  /// Calls use(voxel, where) for the bone behind a body that nobody owns.
+  template <class Use>
+  void eachBehind(const Body& body, const Use& use) {
+    if (!body.canal) return;
+    const Vec3 canal = body.frame.toLocal(*body.canal);
+    const Block& block = scene_.block;
+    std::size_t v = 0;
+    for (int k = 0; k < block.dims[2]; ++k) {
+      for (int j = 0; j < block.dims[1]; ++j) {
+        for (int i = 0; i < block.dims[0]; ++i, ++v) {
+          if (flood_.cost[v] == kWall || flood_.owner[v] != kNobody || hu_[v] < threshold_hu_) continue;
+          const Vec3 p = body.frame.toLocal(block.place(i, j, k));
+          if (p.y < body.back_mm + 2) continue;
+          use(v, {std::abs(p.x - canal.x) / body.half_width_mm, (p.y - canal.y) / body.half_width_mm,
+                  p.z / body.height_mm});
+        }
+      }
+    }
+  }
+
+  void sow(std::size_t v, std::uint8_t owner, std::uint16_t start) { flood_.owner[v] = owner, flood_.start[v] = start; }
+
   void sowBehind(const Body& body, const Vec3& start, std::uint8_t owner) {
     constexpr double kReach_mm = 22, kThick_mm = 4;
     double bone_mm = 0;
@@ -116,12 +173,6 @@ class Seeds {
   const std::vector<float>& hu_;
   double threshold_hu_;
   Flood& flood_;
-};
-
-/// A place behind a body, in the body's own measures: aside of and behind the canal's middle in half widths, over the
-/// body's middle in heights.
-struct Behind {
-  double aside, back, over;
 };
 
 /// Where two vertebrae meet at their facets some places are nearly always of one of them. The lower one's superior
@@ -159,6 +210,26 @@ void marshalFacets(const Block& block, const Body& body, bool is_lower, std::uin
   }
 }
 
+/// Beside the body of a sacrum there is bone, its alae; beside a lumbar body that the scan cuts off there is muscle.
+/// @param likeness  where the body should be.
+bool isSacrum(const Scene& scene, const Body& likeness, double threshold_hu) {
+  constexpr double kAside = 1.5;      // of half the body's width: farther than any spur, nearer than the ilium
+  constexpr double kLeastPart = 0.2;  // transverse processes and spurs fill a tenth at most, alae a third and more
+  int places = 0, bone = 0;
+  for (int z = -2; z <= 5; ++z) {
+    for (int y = -2; y <= 10; ++y) {
+      for (const double side : {-kAside, kAside}) {
+        const Vec3 p = likeness.frame.toPatient(
+            {side * likeness.half_width_mm, 0.1 * y * likeness.back_mm, 0.1 * z * likeness.height_mm});
+        if (!isKnown(scene.block, p)) continue;
+        ++places;
+        bone += valueAt(scene.block, scene.smooth, p) > threshold_hu ? 1 : 0;
+      }
+    }
+  }
+  return bone > kLeastPart * places;
+}
+
 /// Gives owners to voxels near owned ones that the flood did not enter, so that the edge can be drawn anywhere.
 void spread(const Block& block, std::vector<std::uint8_t>& owner) {
   constexpr std::uint32_t kSteps = 3;
@@ -179,12 +250,19 @@ Ownership shareBone(const Scene& scene, const Spine& spine, double threshold_hu)
     marshalFacets(scene.block, spine.wanted, false, kBelow, kWanted, flood.against);
   }
   Seeds seeds(scene, hu, threshold_hu, flood);
-  seeds.sowBody(spine.wanted, kWanted, false);
-  seeds.sowBody(spine.above.body, kAbove, !spine.above.found);
-  seeds.sowBody(spine.below.body, kBelow, !spine.below.found);
+  seeds.sowBody(spine.wanted, kWanted, false, true);
+  seeds.sowBody(spine.above.body, kAbove, !spine.above.found, true);
+  seeds.sowBody(spine.below.body, kBelow, !spine.below.found, spine.below.found);
+  seeds.sowArch(spine.wanted, kWanted);
+  if (spine.above.found) seeds.sowArch(spine.above.body, kAbove);
   seeds.sowLamina(spine.wanted, kWanted);
   seeds.sowLamina(spine.above.body, kAbove);
-  seeds.sowLamina(spine.below.body, kBelow);
+  if (spine.below.found) {
+    seeds.sowArch(spine.below.body, kBelow);
+    seeds.sowLamina(spine.below.body, kBelow);
+  } else {
+    seeds.sowUnder(spine.wanted, isSacrum(scene, spine.below.body, threshold_hu) ? kSacrumStart : std::uint16_t{0});
+  }
   seeds.sowSides(spine.wanted);
   Ownership out{compete(flood, kFarthest).owner};
   spread(scene.block, out.owner);

@@ -14,19 +14,21 @@ constexpr double kRadius_mm = 5;
 constexpr int kClicks = 3;
 constexpr std::uint64_t kSeed = 1;
 
-/// What is asserted is what 5 clicks reached, less 0.02 to 0.03, by which clicks differ; never the aim where that was
+/// What is asserted is what 5 clicks reached, less about 0.02, by which clicks differ; never the aim where that was
 /// missed:
-/// - L3 to L5 of verse-014: facets so worn that no joint space shows; the labels' border follows no edge of the scan
-///   there, and the flood meets elsewhere (of L4's 4,500 missed voxels 2,600 go to its neighbours).
-/// - its L5 besides: the sacrum is not found as a rival, so a likeness of L5 stands for it.
+/// - L4 and L5 of verse-014: facets so worn that no joint space shows; the labels' border follows no edge of the scan
+///   there, and the flood meets elsewhere (of L4's 3,600 missed voxels 1,800 go to its neighbours, of L5's 4,200
+///   surplus ones 1,200 are L4's).
+/// - its L5 besides: the cortex of the transverse processes is thinner than its voxels and their marrow as dark as
+///   muscle, so some 1,100 voxels of them are not told from muscle; of the sacrum only its alae are recognised.
 /// - tptbox L3: voxels of 1.5 mm; where the label draws the surface moves by half a voxel from place to place, which no
-///   one threshold follows (2,100 voxels too many and 1,000 too few; with one of 160 HU: 1,800 and 1,600).
+///   one threshold follows (1,600 surplus voxels at the edge).
 struct Level {
   const char* name;
   double median, worst;
 };
-constexpr Level kLevels[] = {{"verse-014 L1", 0.92, 0.91}, {"verse-014 L2", 0.92, 0.88}, {"verse-014 L3", 0.90, 0.89},
-                             {"verse-014 L4", 0.87, 0.86}, {"verse-014 L5", 0.83, 0.80}, {"tptbox L3", 0.88, 0.88}};
+constexpr Level kLevels[] = {{"verse-014 L1", 0.92, 0.91}, {"verse-014 L2", 0.93, 0.88}, {"verse-014 L3", 0.91, 0.90},
+                             {"verse-014 L4", 0.88, 0.88}, {"verse-014 L5", 0.87, 0.83}, {"tptbox L3", 0.90, 0.895}};
 
 TEST(IsolateOnRealScans, OneClickReachesTheStatedOverlapWithEveryLabelledVertebra) {
   const std::filesystem::path folder = std::filesystem::path(SPINALTAP_SHARED_DATA) / "ct";
