@@ -20,7 +20,7 @@ constexpr std::uint64_t kSeed = 1;
 ///   there, and the flood meets elsewhere (of L4's 3,600 missed voxels 1,800 go to its neighbours, of L5's 4,200
 ///   surplus ones 1,200 are L4's).
 /// - its L5 besides: the cortex of the transverse processes is thinner than its voxels and their marrow as dark as
-///   muscle, so some 1,100 voxels of them are not told from muscle; of the sacrum only its alae are recognised.
+///   muscle, so some 600 voxels of them are not told from muscle; of the sacrum only its alae are recognised.
 /// - tptbox L3: voxels of 1.5 mm; where the label draws the surface moves by half a voxel from place to place, which no
 ///   one threshold follows (1,600 surplus voxels at the edge).
 struct Level {
@@ -28,7 +28,7 @@ struct Level {
   double median, worst;
 };
 constexpr Level kLevels[] = {{"verse-014 L1", 0.92, 0.91}, {"verse-014 L2", 0.93, 0.88}, {"verse-014 L3", 0.91, 0.90},
-                             {"verse-014 L4", 0.88, 0.88}, {"verse-014 L5", 0.87, 0.83}, {"tptbox L3", 0.90, 0.895}};
+                             {"verse-014 L4", 0.88, 0.88}, {"verse-014 L5", 0.88, 0.84}, {"tptbox L3", 0.90, 0.895}};
 
 TEST(IsolateOnRealScans, OneClickReachesTheStatedOverlapWithEveryLabelledVertebra) {
   const std::filesystem::path folder = std::filesystem::path(SPINALTAP_SHARED_DATA) / "ct";
