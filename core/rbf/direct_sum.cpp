@@ -43,4 +43,13 @@ std::vector<double> distancesAmong(const Coordinates& points, std::span<const do
   return out;
 }
 
+std::vector<double> distancesFrom(const Coordinates& points, const Coordinates& sources,
+                                  std::span<const double> weights, unsigned threads) {
+  std::vector<double> out(points.size(), 0.0);
+  parallelBlocks(points.size(), kTile, threads, [&](std::size_t begin, std::size_t end) {
+    addDistances(points.part(begin, end), sources.part(0, sources.size()), weights.data(), out.data() + begin);
+  });
+  return out;
+}
+
 }  // namespace spinaltap::rbf

@@ -25,4 +25,8 @@ struct Coordinates {
 [[nodiscard]] std::vector<double> distancesAmong(const Coordinates& points, std::span<const double> weights,
                                                  unsigned threads);
 
+/// out[i] = sum_j weights[j] |points[i] - sources[j]|.
+[[nodiscard]] std::vector<double> distancesFrom(const Coordinates& points, const Coordinates& sources,
+                                                std::span<const double> weights, unsigned threads);
+
 }  // namespace spinaltap::rbf

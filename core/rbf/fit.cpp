@@ -71,7 +71,10 @@ void measureResiduals(const Samples& samples, const Model& model, unsigned threa
   } else {
     std::vector<Vec3> points(report.residual_samples);
     for (std::size_t n = 0; n < points.size(); ++n) points[n] = samples.positions[chosen(n)];
-    evaluate(model, points, values, threads);
+    values =
+        distancesFrom(Coordinates(points, model.centroid_patient), Coordinates(model.centres), model.weights, threads);
+    for (std::size_t n = 0; n < values.size(); ++n)
+      values[n] += model.constant + dot(model.linear, points[n] - model.centroid_patient);
   }
   double squares = 0;
   for (std::size_t n = 0; n < values.size(); ++n) {

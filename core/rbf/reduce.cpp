@@ -13,9 +13,10 @@ namespace {
 constexpr double kFirstShare = 12;  // one point in so many to begin with
 // Each round adds at most this share of the centres so far: more would crowd around one bad spot, less costs rounds.
 constexpr double kGrowth = 0.6;
+constexpr double kFew = 0.01, kNearly = 0.9;
 // Centres are solved for more closely than the reduction asks, so that what is missed is missed for want of centres; as
 // long as much is missed, that need not be so close.
-constexpr double kSolveShare = 0.1, kFirstSolveShare = 0.5;
+constexpr double kSolveShare = 0.25, kFirstSolveShare = 0.5;
 
 /// Refuses points closer than a radius to one already taken (cells as wide as the radius, 27 looked at).
 class Spacing {
@@ -69,10 +70,16 @@ std::vector<double> missed(std::span<const Vec3> points, std::span<const double>
 /// The next centres: the worst points beyond the tolerance that do not crowd each other.
 std::vector<std::uint32_t> worst(std::span<const Vec3> points, const std::vector<double>& errors,
                                  const std::vector<std::uint8_t>& taken, double tolerance, std::size_t centres) {
-  std::vector<std::uint32_t> order;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (taken[i] == 0 && std::abs(errors[i]) > tolerance) order.push_back(static_cast<std::uint32_t>(i));
-  }
+  const auto beyond = [&](double limit) {
+    std::vector<std::uint32_t> out;
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      if (taken[i] == 0 && std::abs(errors[i]) > limit) out.push_back(static_cast<std::uint32_t>(i));
+    }
+    return out;
+  };
+  std::vector<std::uint32_t> order = beyond(tolerance);
+  // Few are left: those that are nearly beyond would be next, at the cost of a round for some of them each.
+  if (!order.empty() && order.size() < kFew * static_cast<double>(centres)) order = beyond(kNearly * tolerance);
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     const double ea = std::abs(errors[a]), eb = std::abs(errors[b]);
     return ea != eb ? ea > eb : a < b;
@@ -104,7 +111,7 @@ Result<Reduced> reduce(std::span<const Vec3> points, std::span<const double> val
     for (const std::uint32_t i : out.centres) centres.push_back(points[i]), wanted.push_back(values[i]);
     const auto system = System::make(centres, 0, threads);
     if (!system) return tl::unexpected(system.error());
-    out.solution = system->solve(wanted, share * tolerance);
+    out.solution = system->solve(wanted, share * tolerance, {}, out.solution.order);
     const std::vector<double> errors = missed(points, values, centres, out.solution, tolerance, threads);
     out.largest = 0;
     for (const double e : errors) out.largest = std::max(out.largest, std::abs(e));

@@ -11,7 +11,7 @@ namespace {
 
 // Of a coarse system, a direction to search in is wanted, not an answer.
 constexpr int kRoughNodes = 5, kRoughRounds = 8;
-constexpr int kMostRounds = 60, kRestart = 30, kFirstNodes = 5, kLastSingle = 7, kRefinements = 4;
+constexpr int kMostRounds = 60, kRestart = 30, kLastSingle = 8, kRefinements = 4;
 // A sum's order is checked against direct sums at this many points.
 constexpr std::size_t kChecked = 128;
 
@@ -40,10 +40,10 @@ std::vector<double> exactResidual(const std::vector<Vec3>& points, double ridge,
   return out;
 }
 
-FastSumOptions sumOptions(int nodes, bool single, unsigned threads) {
+FastSumOptions sumOptions(SumOrder order, unsigned threads) {
   FastSumOptions options;
-  options.nodes = nodes, options.threads = threads, options.leaf_size = 200;
-  options.single_error = single ? std::numeric_limits<double>::infinity() : 0;
+  options.nodes = order.nodes, options.threads = threads, options.leaf_size = 200;
+  options.single_error = order.single ? std::numeric_limits<double>::infinity() : 0;
   return options;
 }
 
@@ -56,8 +56,8 @@ void applyMatrix(const FastSum& sum, const std::vector<Vec3>& points, double rid
 /// The matrix, with sums as fine as they have to be.
 class Matrix {
  public:
-  Matrix(const std::vector<Vec3>& points, double ridge, unsigned threads)
-      : points_(points), ridge_(ridge), threads_(threads), coordinates_(points) {
+  Matrix(const std::vector<Vec3>& points, double ridge, SumOrder order, unsigned threads)
+      : points_(points), ridge_(ridge), order_(order), threads_(threads), coordinates_(points) {
     plan();
   }
 
@@ -80,11 +80,11 @@ class Matrix {
 
   /// A finer sum; false when there is none.
   bool refine() {
-    // Another node an axis gains a factor of four and more; single precision ends somewhere near seven.
-    if (nodes_ >= kLastSingle && single_) {
-      single_ = false;
-    } else if (nodes_ < Chebyshev::kMost) {
-      ++nodes_;
+    // Another node an axis gains a factor of four and more; single precision ends somewhere near eight.
+    if (order_.nodes >= kLastSingle && order_.single) {
+      order_.single = false;
+    } else if (order_.nodes < Chebyshev::kMost) {
+      ++order_.nodes;
     } else {
       return false;
     }
@@ -92,14 +92,15 @@ class Matrix {
     return true;
   }
 
+  [[nodiscard]] SumOrder order() const { return order_; }
+
  private:
-  void plan() { sum_ = std::make_unique<FastSum>(points_, points_, sumOptions(nodes_, single_, threads_)); }
+  void plan() { sum_ = std::make_unique<FastSum>(points_, points_, sumOptions(order_, threads_)); }
 
   const std::vector<Vec3>& points_;
   double ridge_;
+  SumOrder order_;
   unsigned threads_;
-  int nodes_ = kFirstNodes;
-  bool single_ = true;
   Coordinates coordinates_;
   std::unique_ptr<FastSum> sum_;
 };
@@ -205,7 +206,7 @@ Result<System> System::make(std::span<const Vec3> points, double ridge, unsigned
   if (!made) return tl::unexpected(made.error());
   out.preconditioner_ = std::make_unique<Preconditioner>(std::move(*made));
   if (use == Use::Roughly)
-    out.rough_sum_ = std::make_unique<FastSum>(out.points_, out.points_, sumOptions(kRoughNodes, true, threads));
+    out.rough_sum_ = std::make_unique<FastSum>(out.points_, out.points_, sumOptions({kRoughNodes, true}, threads));
   return out;
 }
 
@@ -251,12 +252,12 @@ SystemSolution System::solveRoughly(std::span<const double> values, double wante
 }
 
 SystemSolution System::solve(std::span<const double> values, double tolerance,
-                             const std::function<void(double)>& progress) const {
+                             const std::function<void(double)>& progress, SumOrder order) const {
   if (direct_) return solveDirectly(values, tolerance);
   SystemSolution out;
   const std::size_t n = points_.size();
   out.weights.assign(n, 0.0);
-  Matrix matrix(points_, ridge_, threads_);
+  Matrix matrix(points_, ridge_, order, threads_);
   // The answer is as good as the sums that lead to it: take finer ones where direct sums disagree.
   const auto sums_agree = [&](std::span<const double> weights, const Polynomial& p, std::span<double> out_values,
                               double size) {
@@ -294,6 +295,7 @@ SystemSolution System::solve(std::span<const double> values, double tolerance,
     sums_agree(out.weights, out.polynomial, applied, 1);
     for (std::size_t i = 0; i < n; ++i) residual[i] = values[i] - applied[i];
   }
+  out.order = matrix.order();
   return out;
 }
 

@@ -14,12 +14,19 @@
 
 namespace spinaltap::rbf {
 
+/// How fine the sums of a solver are: Chebyshev nodes an axis, and the precision.
+struct SumOrder {
+  int nodes = 5;
+  bool single = true;
+};
+
 /// u and p of  sum_j u_j (-|x_i - x_j|) + ridge u_i + p(x_i) = f_i,  P^T u = 0.
 struct SystemSolution {
   std::vector<double> weights;
   Polynomial polynomial{};
   int rounds = 0;           ///< products with the whole matrix; 0 when it was solved directly
   double residual_max = 0;  ///< of the equations, as far as the sums that were used can tell
+  SumOrder order;           ///< what it took
 };
 
 /// Factors once, solves for as many right-hand sides as wanted: directly for up to kDirect points, else by flexible
@@ -36,8 +43,9 @@ class System {
                                            Use use = Use::Solve);
 
   /// Until every equation is met within `tolerance`, or rounding lets it come no closer: then residual_max tells.
+  /// @param first  to begin with; finer where direct sums disagree.
   [[nodiscard]] SystemSolution solve(std::span<const double> values, double tolerance,
-                                     const std::function<void(double)>& progress = {}) const;
+                                     const std::function<void(double)>& progress = {}, SumOrder first = {}) const;
   /// Until the residuals' root mean square is as wanted, or some rounds have passed; the sums are rough. For a search
   /// direction.
   /// @pre made for Use::Roughly.
