@@ -8,6 +8,7 @@ namespace spinaltap::rbf {
 namespace {
 
 constexpr std::size_t kTile = 512;   // points whose distances are taken at a time
+constexpr std::size_t kRows = 64;    // and of those whose sources are others
 constexpr std::size_t kGroups = 16;  // each with sums of its own: added in order, whoever made them
 
 }  // namespace
@@ -46,7 +47,7 @@ std::vector<double> distancesAmong(const Coordinates& points, std::span<const do
 std::vector<double> distancesFrom(const Coordinates& points, const Coordinates& sources,
                                   std::span<const double> weights, unsigned threads) {
   std::vector<double> out(points.size(), 0.0);
-  parallelBlocks(points.size(), kTile, threads, [&](std::size_t begin, std::size_t end) {
+  parallelBlocks(points.size(), kRows, threads, [&](std::size_t begin, std::size_t end) {
     addDistances(points.part(begin, end), sources.part(0, sources.size()), weights.data(), out.data() + begin);
   });
   return out;

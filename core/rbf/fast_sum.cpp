@@ -164,11 +164,20 @@ FastSources::Values FastSum::passAcross(const FastSources::Weighted& weighted) c
     for (std::size_t n = begin; n < end; ++n) {
       if (lists.first[n] == lists.first[n + 1]) continue;
       const Gathered<double> at = nodesOf(sources_->chebyshevOf(nodes[n]), *targets_, nodes[n]);
+      const bool single = std::isinf(options().single_error);
+      const Vec3 middle = targets_->middleOf(nodes[n]);
+      Gathered<float> near_at, points;
+      if (single) near_at.add(at.points(), nullptr, middle);
       for (std::uint32_t i = lists.first[n]; i < lists.first[n + 1]; ++i) {
         const OctreeNode& source = sources_->tree().nodes()[lists.source[i]];
-        addDistances(at.points(), sources_->tree().points(source), weighted.sorted.data() + source.first,
-                     down.data() + down_first_[n]);
+        const double* const weights = weighted.sorted.data() + source.first;
+        if (single) {
+          points.add(sources_->tree().points(source), weights, middle);
+        } else {
+          addDistances(at.points(), sources_->tree().points(source), weights, down.data() + down_first_[n]);
+        }
       }
+      if (single) addDistances(near_at.points(), points.points(), points.w.data(), down.data() + down_first_[n]);
     }
   });
   return down;
@@ -204,19 +213,26 @@ void FastSum::eachLeaf(const FastSources::Weighted& weighted, const Use& use) co
       if (!node.leaf() || node.count == 0) continue;
       const Vec3 middle = targets_->middleOf(node);
       wide.clear(), narrow.clear();
-      for (std::uint32_t i = near.first[n]; i < near.first[n + 1]; ++i) {
-        const OctreeNode& source = sources_->tree().nodes()[near.source[i]];
-        wide.add(sources_->tree().points(source), weighted.sorted.data() + source.first, middle);
-      }
-      for (std::uint32_t i = from_nodes.first[n]; i < from_nodes.first[n + 1]; ++i) {
-        const std::size_t source = from_nodes.source[i];
-        const OctreeNode& cube = sources_->tree().nodes()[source];
-        const Gathered<double> at = nodesOf(sources_->chebyshevOf(cube), sources_->tree(), cube);
-        wide.add(at.points(), weighted.up.data() + sources_->first()[source], middle);
-      }
-      if (options().single_error > 0 && singleError(wide, targets_->halfOf(node.level)) <= options().single_error) {
-        narrow.addAll(wide);
-        wide.clear();
+      const auto gather = [&](auto& into) {
+        for (std::uint32_t i = near.first[n]; i < near.first[n + 1]; ++i) {
+          const OctreeNode& source = sources_->tree().nodes()[near.source[i]];
+          into.add(sources_->tree().points(source), weighted.sorted.data() + source.first, middle);
+        }
+        for (std::uint32_t i = from_nodes.first[n]; i < from_nodes.first[n + 1]; ++i) {
+          const std::size_t source = from_nodes.source[i];
+          const OctreeNode& cube = sources_->tree().nodes()[source];
+          const Gathered<double> at = nodesOf(sources_->chebyshevOf(cube), sources_->tree(), cube);
+          into.add(at.points(), weighted.up.data() + sources_->first()[source], middle);
+        }
+      };
+      if (std::isinf(options().single_error)) {
+        gather(narrow);
+      } else {
+        gather(wide);
+        if (options().single_error > 0 && singleError(wide, targets_->halfOf(node.level)) <= options().single_error) {
+          narrow.addAll(wide);
+          wide.clear();
+        }
       }
       use(n, middle, wide, narrow);
     }

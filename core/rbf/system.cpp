@@ -57,7 +57,10 @@ void applyMatrix(const FastSum& sum, const std::vector<Vec3>& points, double rid
 class Matrix {
  public:
   Matrix(const std::vector<Vec3>& points, double ridge, SumOrder order, unsigned threads)
-      : points_(points), ridge_(ridge), order_(order), threads_(threads), coordinates_(points) {
+      : points_(points), ridge_(ridge), order_(order), threads_(threads), coordinates_(points), checked_({}) {
+    std::vector<Vec3> checked;
+    for (std::size_t n = 0; n < kChecked; ++n) checked.push_back(points_[checkedPoint(n)]);
+    checked_ = Coordinates(checked);
     plan();
   }
 
@@ -68,12 +71,11 @@ class Matrix {
   /// The largest error of apply() over some points, for these weights.
   [[nodiscard]] double errorOf(std::span<const double> weights, std::span<const double> applied,
                                const Polynomial& p) const {
+    const std::vector<double> direct = distancesFrom(checked_, coordinates_, weights, threads_);
     double most = 0;
     for (std::size_t n = 0; n < kChecked; ++n) {
-      const std::size_t i = n * points_.size() / kChecked;
-      double direct = 0;
-      addDistances(coordinates_.part(i, i + 1), coordinates_.part(0, points_.size()), weights.data(), &direct);
-      most = std::max(most, std::abs(-direct + ridge_ * weights[i] + valueAt(p, points_[i]) - applied[i]));
+      const std::size_t i = checkedPoint(n);
+      most = std::max(most, std::abs(-direct[n] + ridge_ * weights[i] + valueAt(p, points_[i]) - applied[i]));
     }
     return most;
   }
@@ -95,13 +97,14 @@ class Matrix {
   [[nodiscard]] SumOrder order() const { return order_; }
 
  private:
+  [[nodiscard]] std::size_t checkedPoint(std::size_t n) const { return n * points_.size() / kChecked; }
   void plan() { sum_ = std::make_unique<FastSum>(points_, points_, sumOptions(order_, threads_)); }
 
   const std::vector<Vec3>& points_;
   double ridge_;
   SumOrder order_;
   unsigned threads_;
-  Coordinates coordinates_;
+  Coordinates coordinates_, checked_;
   std::unique_ptr<FastSum> sum_;
 };
 
