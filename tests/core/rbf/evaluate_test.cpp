@@ -51,6 +51,7 @@ TEST(Evaluator, StaysWithinItsToleranceOfTheOracleForValuesAndTheirSlopes) {
   for (int i = 0; i < 3000; ++i) points.push_back(Vec3{10, 20, 30} + randomPoint(random, 25));
   for (int i = 0; i < 200; ++i) points.push_back(s.positions[static_cast<std::size_t>(i)]);           // on centres
   for (int i = 0; i < 50; ++i) points.push_back(randomDirection(random) * random.uniform(1e3, 1e7));  // far away
+  for (int i = 0; i < 300; ++i) points.push_back(Vec3{10, 20, 30} + randomPoint(random, 60));         // around
   std::vector<double> direct(points.size()), fast(points.size());
   std::vector<Vec3> direct_slope(points.size()), fast_slope(points.size());
   evaluate(m, points, direct);
