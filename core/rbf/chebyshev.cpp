@@ -31,7 +31,7 @@ void applyAndTurn(const std::vector<double>& m, std::size_t rows, std::size_t co
 /// One matrix an axis: from `from` to `to` nodes an axis, added to out.
 void applyToAxes(const std::vector<double>* const matrices[3], std::size_t to, std::size_t from, const double* in,
                  double* out) {
-  constexpr std::size_t kRoom = Chebyshev::kMost * Chebyshev::kMost * Chebyshev::kMost;
+  constexpr std::size_t kMost = Chebyshev::kMost, kRoom = kMost * kMost * kMost;
   double a[kRoom], b[kRoom];
   applyAndTurn(*matrices[0], to, from, from * from, in, a);
   applyAndTurn(*matrices[1], to, from, from * to, a, b);

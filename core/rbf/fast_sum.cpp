@@ -75,7 +75,7 @@ FastSum::FastSum(std::span<const Vec3> sources, std::span<const Vec3> targets, c
   meet(made, same ? std::shared_ptr<const Octree>(made, &made->tree()) : treeOf(*made, targets, options));
 }
 
-FastSum::FastSum(std::shared_ptr<const FastSources> sources, std::span<const Vec3> targets,
+FastSum::FastSum(const std::shared_ptr<const FastSources>& sources, std::span<const Vec3> targets,
                  const FastSumOptions& options) {
   meet(sources, treeOf(*sources, targets, options));
 }

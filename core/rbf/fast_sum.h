@@ -21,7 +21,8 @@ class FastSum {
   FastSum(std::span<const Vec3> sources, std::span<const Vec3> targets, const FastSumOptions& options);
 
   /// @pre the targets are within the sources' root.
-  FastSum(std::shared_ptr<const FastSources> sources, std::span<const Vec3> targets, const FastSumOptions& options);
+  FastSum(const std::shared_ptr<const FastSources>& sources, std::span<const Vec3> targets,
+          const FastSumOptions& options);
 
   /// out[i] = sum_j weights[j] |targets[i] - sources[j]|.
   void values(std::span<const double> weights, std::span<double> out) const { values(sources_->weigh(weights), out); }

@@ -76,7 +76,7 @@ struct Exact {
 /// Two vectors of targets, the last ones filled up with the last target: two chains hide the root's latency.
 template <class T>
 struct Chunk {
-  static constexpr std::size_t kMost = 2 * HWY_MAX_BYTES / sizeof(T);
+  static constexpr std::size_t kMost = 2 * std::size_t{HWY_MAX_BYTES} / sizeof(T);
   HWY_ALIGN T x[kMost];
   HWY_ALIGN T y[kMost];
   HWY_ALIGN T z[kMost];
@@ -128,7 +128,7 @@ struct Total<float> {
 };
 
 template <class T>
-constexpr std::size_t kChunk = 2 * HWY_MAX_BYTES / sizeof(T);
+constexpr std::size_t kChunk = 2 * std::size_t{HWY_MAX_BYTES} / sizeof(T);
 
 template <class Root, class T>
 void distances(const PointArrays<T>& targets, const PointArrays<T>& sources, const T* HWY_RESTRICT w, double* out) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kNeighbours = 64, kNoisePlaces = 400;
 constexpr std::size_t kPatch = 480, kPatchInner = 200, kPatches = 8;
-constexpr int kQuadratic = 10;  // coefficients
+constexpr Eigen::Index kQuadratic = 10;  // coefficients
 constexpr int kBisections = 14;
 
 /// What a quadratic in three variables leaves of the values, as a standard deviation; negative when it cannot be told.

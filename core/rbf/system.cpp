@@ -185,7 +185,7 @@ int search(const Preconditioner& preconditioner, const Apply& apply, Cycle& cycl
            const std::function<void(double)>& progress) {
   int rounds = 0;
   for (bool more = true; more && rounds < most && cycle.left() > wanted; ++rounds) {
-    std::vector<double> z(cycle.newest().size()), az(z.size());
+    std::vector<double> z(cycle.newest().size()), az(cycle.newest().size());
     const Polynomial p = preconditioner.apply(cycle.newest(), z);
     apply(z, p, az);
     more = cycle.add(std::move(z), p, std::move(az));

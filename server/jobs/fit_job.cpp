@@ -41,7 +41,7 @@ template <class Allowed, class Use>
 Result<void> eachRow(std::string_view text, std::string_view name, const char* wanted, const Allowed& allowed,
                      const Use& use) {
   std::size_t columns = 0, rows = 0;
-  const auto read = eachLine(text, name, [&](std::string_view line) -> Result<void> {
+  auto read = eachLine(text, name, [&](std::string_view line) -> Result<void> {
     Row row{};
     const auto count = parseRow(line, row);
     if (!count) return tl::unexpected(count.error());
@@ -130,7 +130,7 @@ Result<void> evaluateAt(const FitJob& job, const rbf::Model& model, Figures& fig
   }
   std::filesystem::path file = job.values;
   if (file.empty()) file = job.points, file += ".values";
-  const auto written = store::replaceFile(file, std::as_bytes(std::span(out)));
+  auto written = store::replaceFile(file, std::as_bytes(std::span(out)));
   if (!written) return written;
   figures["points"] = values.size();
   figures["evaluate_s"] = evaluate_s;

@@ -301,7 +301,7 @@ TEST(Isolate, GivesTheSameFromAnyNumberOfThreadsAndProgressThatOnlyGrows) {
 
 TEST(Isolate, SaysInOneLineWhatIsWrong) {
   const Column& column = threeInAColumn();
-  const auto& frame = phantom::Phantom::make({}).frame();
+  const Frame frame = phantom::Phantom::make({}).frame();
   const auto muscle = isolated(column.ct, frame.toPatient({36, 45, 0}));
   ASSERT_FALSE(muscle.has_value());
   EXPECT_EQ(muscle.error().code, ErrorCode::NotFound);
