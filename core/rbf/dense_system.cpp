@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/box.h"
 #include "core/base/parallel.h"
 
 namespace spinaltap::rbf {
@@ -16,11 +17,7 @@ struct Ball {
 };
 
 Ball ballOf(std::span<const Vec3> points) {
-  Vec3 low = points.front(), high = low;
-  for (const Vec3& p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
+  const auto [low, high] = boxAround(points);
   Ball ball{(low + high) * 0.5, 0};
   for (const Vec3& p : points) ball.radius = std::max(ball.radius, norm(p - ball.middle));
   if (!(ball.radius > 0)) ball.radius = 1;

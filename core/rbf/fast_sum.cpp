@@ -88,13 +88,6 @@ void FastSum::meet(std::shared_ptr<const FastSources> sources, std::shared_ptr<c
   down_first_ = sources_->offsetsOf(*targets_);
 }
 
-std::size_t FastSum::bytes() const {
-  return seen_.far.size() * sizeof(Interactions::FarPair) +
-         (seen_.near.source.size() + seen_.from_nodes.source.size()) * sizeof(std::uint32_t) +
-         (sources_->tree().size() + targets_->size()) * 28 +
-         (sources_->first().back() + down_first_.back()) * sizeof(double);
-}
-
 template <class T>
 void FastSum::farColumns(std::size_t from, std::size_t columns, const Values& up, Values& down, std::vector<T>& x,
                          std::vector<T>& y) const {

@@ -33,8 +33,6 @@ class FastSum {
   }
   void gradients(const FastSources::Weighted& weighted, std::span<Vec3> out) const;
 
-  [[nodiscard]] std::size_t bytes() const;
-
  private:
   using Values = FastSources::Values;
 

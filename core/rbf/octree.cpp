@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/box.h"
 #include "core/base/parallel.h"
 
 namespace spinaltap::rbf {
@@ -46,13 +47,9 @@ void sortByHighBits(std::vector<Keyed>& items, int bits) {
 }  // namespace
 
 RootCube RootCube::around(std::span<const Vec3> a, std::span<const Vec3> b) {
-  Vec3 low = a.empty() ? b.front() : a.front(), high = low;
-  for (const std::span<const Vec3> set : {a, b}) {
-    for (const Vec3& p : set) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-  }
+  Box box = boxAround(a.empty() ? b : a);
+  for (const Vec3& p : b) box.add(p);
+  const auto& [low, high] = box;
   const Vec3 size = high - low;
   const double longest = std::max({size.x, size.y, size.z});
   // One point, or points that rounding cannot tell apart, still get a cube.

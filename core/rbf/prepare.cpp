@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "core/base/box.h"
+
 namespace spinaltap::rbf {
 namespace {
 
@@ -28,11 +30,7 @@ Result<void> checkSamples(const Samples& samples) {
 }
 
 void recentre(const Samples& samples, PreparedSamples& out) {
-  Vec3 low = samples.positions.front(), high = low;
-  for (const Vec3& p : samples.positions) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
+  const auto [low, high] = boxAround(samples.positions);
   out.centroid_patient = low + (high - low) * 0.5;
   out.scale_mm = norm(high - low);
   if (!(out.scale_mm > 0)) out.scale_mm = 1;

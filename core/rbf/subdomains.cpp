@@ -5,26 +5,24 @@
 #include <limits>
 #include <numeric>
 
+#include "core/base/box.h"
 #include "core/base/parallel.h"
 
 namespace spinaltap::rbf {
 namespace {
 
-struct Box {
-  Vec3 low, high;
+double squaredDistance(const Box& a, const Vec3& p) {
+  const double x = std::max({a.low.x - p.x, 0.0, p.x - a.high.x}), y = std::max({a.low.y - p.y, 0.0, p.y - a.high.y}),
+               z = std::max({a.low.z - p.z, 0.0, p.z - a.high.z});
+  return x * x + y * y + z * z;
+}
 
-  [[nodiscard]] double squaredDistance(const Vec3& p) const {
-    const double x = std::max({low.x - p.x, 0.0, p.x - high.x}), y = std::max({low.y - p.y, 0.0, p.y - high.y}),
-                 z = std::max({low.z - p.z, 0.0, p.z - high.z});
-    return x * x + y * y + z * z;
-  }
-  [[nodiscard]] double squaredDistance(const Box& b) const {
-    const double x = std::max({low.x - b.high.x, 0.0, b.low.x - high.x}),
-                 y = std::max({low.y - b.high.y, 0.0, b.low.y - high.y}),
-                 z = std::max({low.z - b.high.z, 0.0, b.low.z - high.z});
-    return x * x + y * y + z * z;
-  }
-};
+double squaredDistance(const Box& a, const Box& b) {
+  const double x = std::max({a.low.x - b.high.x, 0.0, b.low.x - a.high.x}),
+               y = std::max({a.low.y - b.high.y, 0.0, b.low.y - a.high.y}),
+               z = std::max({a.low.z - b.high.z, 0.0, b.low.z - a.high.z});
+  return x * x + y * y + z * z;
+}
 
 /// A tree of halves.
 class Halves {
@@ -49,14 +47,14 @@ class Halves {
   template <class Use>
   void eachNear(const Box& box, double squared, const Use& use, std::size_t at = 0) const {
     const Node& node = nodes_[at];
-    if (node.box.squaredDistance(box) > squared) return;
+    if (squaredDistance(node.box, box) > squared) return;
     if (node.left != 0) {
       eachNear(box, squared, use, node.left);
       eachNear(box, squared, use, node.right);
       return;
     }
     for (const std::uint32_t i : pointsOf(node)) {
-      const double d = box.squaredDistance(points_[i]);
+      const double d = squaredDistance(box, points_[i]);
       if (d <= squared) use(i, d);
     }
   }
@@ -84,11 +82,7 @@ class Halves {
 
   [[nodiscard]] Box boxOf(std::size_t begin, std::size_t end) const {
     Box box{points_[order_[begin]], points_[order_[begin]]};
-    for (std::size_t n = begin; n < end; ++n) {
-      const Vec3& p = points_[order_[n]];
-      box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-      box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
-    }
+    for (std::size_t n = begin; n < end; ++n) box.add(points_[order_[n]]);
     return box;
   }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/box.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/surface/local_shape.h"
@@ -15,17 +16,13 @@ constexpr std::size_t kBlock = 64;
 constexpr int kNewtonSteps = 5;
 constexpr double kAround_mm = 4.0;  // of the bone's box, where sides are asked
 
-struct Box {
-  Vec3 low, high;
-  [[nodiscard]] Vec3 random(Random& r) const {
-    return {r.uniform(low.x, high.x), r.uniform(low.y, high.y), r.uniform(low.z, high.z)};
-  }
-};
+Vec3 randomIn(const Box& box, Random& r) {
+  return {r.uniform(box.low.x, box.high.x), r.uniform(box.low.y, box.high.y), r.uniform(box.low.z, box.high.z)};
+}
 
 Box boxOf(const phantom::Phantom& truth, double margin_mm) {
   const auto bounds = truth.bounds();
-  const Vec3 margin = Vec3{1, 1, 1} * margin_mm;
-  return {bounds.low_patient - margin, bounds.high_patient + margin};
+  return Box{bounds.low_patient, bounds.high_patient}.widened(margin_mm);
 }
 
 /// values[i] = measure(points[i]), on all threads.
@@ -134,7 +131,7 @@ std::vector<Vec3> pointsOfTruth(const phantom::Phantom& truth, std::size_t count
   Random random(seed);
   std::vector<Vec3> out;
   while (out.size() < count) {
-    Vec3 p = box.random(random);
+    Vec3 p = randomIn(box, random);
     if (std::abs(truth.signedDistance(p)) > 1.0) continue;
     for (int step = 0; step < kNewtonSteps; ++step) {
       const Vec3 g = truth.gradient(p);
@@ -151,7 +148,7 @@ Sides sidesOf(const Field& field, const phantom::Phantom& truth, double margin_m
   Random random(seed);
   std::vector<Vec3> points;
   points.reserve(count);
-  for (std::size_t n = 0; n < count; ++n) points.push_back(box.random(random));
+  for (std::size_t n = 0; n < count; ++n) points.push_back(randomIn(box, random));
   // The slow exact distance only where the Lipschitz bound cannot tell.
   const std::vector<double> distances = eachOf(points, [&](const Vec3& p) {
     const double near = truth.signedDistance(p);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/base/box.h"
 #include "core/base/random.h"
 #include "core/mesh/parts.h"
 #include "core/mesh/polygonise.h"
@@ -86,20 +87,6 @@ Result<Sampling> sample(const Scene& scene, Method method, const RunOptions& opt
   out.made = {std::move(held.fitted), std::move(*samples)};
   out.kept = std::move(held.kept);
   return out;
-}
-
-struct Box {
-  Vec3 low, high;
-};
-
-Box boxOf(const std::vector<Vec3>& points, double margin_mm) {
-  Vec3 low = points.front(), high = low;
-  for (const Vec3& p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const Vec3 margin = Vec3{1, 1, 1} * margin_mm;
-  return {low - margin, high + margin};
 }
 
 /// A swollen surface does not pass by its samples: some are moved onto it, for the mesh to start from.
@@ -221,7 +208,7 @@ Result<Run> runSetting(const Scene& scene, const Setting& setting, const RunOpti
   const Field field = rbf::asField(fit->model, kUnknown, options.field_tolerance_mm);
 
   start = clock();
-  const Box box = boxOf(points, surface::meshMarginFor(setting.method, setting.smoothing));
+  const Box box = boxAround(points).widened(surface::meshMarginFor(setting.method, setting.smoothing));
   auto mesh =
       mesh::polygonise(field, seedsOf(field, points), {options.cell_mm, box.low, box.high}, shares.stage(0.6, 0.7));
   if (!mesh) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/base/box.h"
 #include "core/volume/sample.h"
 
 namespace spinaltap::volume {
@@ -35,18 +36,11 @@ bool inVolume(const Grid& grid, const Vec3& v) {
          v.z <= grid.dims[2] - 0.5;
 }
 
-struct Box {
-  Vec3 low, high;
-};
-
 Box boundsInPatient(const Grid& grid) {
   Box box{grid.origin_patient, grid.origin_patient};
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 p =
-        grid.toPatient({(corner & 1) != 0 ? grid.dims[0] - 1.0 : 0, (corner & 2) != 0 ? grid.dims[1] - 1.0 : 0,
-                        (corner & 4) != 0 ? grid.dims[2] - 1.0 : 0});
-    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
+    box.add(grid.toPatient({(corner & 1) != 0 ? grid.dims[0] - 1.0 : 0, (corner & 2) != 0 ? grid.dims[1] - 1.0 : 0,
+                            (corner & 4) != 0 ? grid.dims[2] - 1.0 : 0}));
   }
   return box;
 }

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "core/base/box.h"
 #include "core/wire/body.h"
 
 namespace spinaltap::wire {
@@ -13,11 +14,7 @@ constexpr const char* kWhat = "mesh";
 
 Vec3 boxCentre(std::span<const Vec3> points) {
   if (points.empty()) return {};
-  Vec3 low = points[0], high = points[0];
-  for (const Vec3& p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
+  const auto [low, high] = boxAround(points);
   const Vec3 centre = (low + high) * 0.5;
   return {std::floor(centre.x + 0.5), std::floor(centre.y + 0.5), std::floor(centre.z + 0.5)};
 }

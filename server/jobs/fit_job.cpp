@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/base/box.h"
 #include "core/base/parallel.h"
 #include "core/surface/surface.h"
 #include "server/jobs/words.h"
@@ -60,11 +61,7 @@ Result<void> eachRow(std::string_view text, std::string_view name, const char* w
 
 /// As on a surface: the box's diagonal over the root of how many there are.
 double usualSpacing(const std::vector<Vec3>& points) {
-  Vec3 low = points.front(), high = low;
-  for (const Vec3& p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
+  const auto [low, high] = boxAround(points);
   return norm(high - low) / std::sqrt(static_cast<double>(points.size()));
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/base/box.h"
 #include "core/mesh/parts.h"
 #include "core/mesh/polygonise.h"
 #include "core/surface/methods.h"
@@ -34,13 +35,8 @@ Result<Region> cropRegion(store::Store& store, const store::Case& row) {
 }
 
 mesh::PolygoniseOptions meshOptions(const std::vector<Vec3>& points, double cell_mm, double margin_mm) {
-  Vec3 low = points.front(), high = points.front();
-  for (const Vec3& p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const Vec3 margin = Vec3{1, 1, 1} * margin_mm;
-  return {cell_mm, low - margin, high + margin};
+  const Box box = boxAround(points).widened(margin_mm);
+  return {cell_mm, box.low, box.high};
 }
 
 Result<void> keep(store::Store& store, const std::string& case_id, const volume::CtVolume& roi, const rbf::Model& model,

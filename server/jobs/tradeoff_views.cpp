@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/base/box.h"
 #include "core/mesh/polygonise.h"
 #include "core/surface/defaults.h"
 #include "core/volume/sample.h"
@@ -18,7 +19,8 @@ constexpr std::size_t kTruthSeeds = 200;
 constexpr double kBlack_hu = -250, kWhite_hu = 1250;
 
 struct Extent {
-  Vec3 low, high, middle;
+  Box box;
+  Vec3 middle;
   double fullest_z = 0;  ///< where most of the label lies in one axial slice: at the pedicles
   std::vector<Vec3> places;
 };
@@ -32,13 +34,11 @@ Extent extentOf(const volume::LabelVolume& label) {
         if (label.inside[label.grid.index(i, j, k)] != 0) {
           out.places.push_back(label.grid.toPatient({1.0 * i, 1.0 * j, 1.0 * k}));
         }
-  out.low = out.high = out.places.front();
+  out.box = boxAround(out.places);
   std::map<long, std::size_t> by_slice;
   const Vec3& s = label.grid.spacing_mm;
   const double slice = std::max({1.0, s.x, s.y, s.z});
   for (const Vec3& p : out.places) {
-    out.low = {std::min(out.low.x, p.x), std::min(out.low.y, p.y), std::min(out.low.z, p.z)};
-    out.high = {std::max(out.high.x, p.x), std::max(out.high.y, p.y), std::max(out.high.z, p.z)};
     out.middle += p / static_cast<double>(out.places.size());
     ++by_slice[std::lround(p.z / slice)];
   }
@@ -87,7 +87,8 @@ mesh::TriangleMesh meshOfTruth(const tradeoff::Scene& scene) {
 
 /// From above, from the patient's left and from the front.
 std::vector<View> alongAxes(const tradeoff::Scene& scene, const Extent& e) {
-  const Vec3 low = e.low - Vec3{1, 1, 1} * kMargin_mm, high = e.high + Vec3{1, 1, 1} * kMargin_mm, size = high - low;
+  const auto [low, high] = e.box.widened(kMargin_mm);
+  const Vec3 size = high - low;
   const mesh::TriangleMesh truth = meshOfTruth(scene);
   const auto view = [&](std::string name, const tradeoff::Plane& plane) {
     View v;
@@ -105,7 +106,8 @@ std::vector<View> alongAxes(const tradeoff::Scene& scene, const Extent& e) {
 
 std::vector<View> viewsOf(const tradeoff::Scene& scene) {
   const Extent e = extentOf(scene.label);
-  const Vec3 size = e.high - e.low + Vec3{1, 1, 1} * (2 * kMargin_mm);
+  const auto [low, high] = e.box.widened(kMargin_mm);
+  const Vec3 size = high - low;
   const auto view = [&](std::string name, const tradeoff::Plane& plane, double step_mm, double bar_mm,
                         double pixel_mm) {
     View v;
@@ -118,12 +120,10 @@ std::vector<View> viewsOf(const tradeoff::Scene& scene) {
   const Vec3 down_z{0, 0, -1};
   const Vec3 process = corner(e);
   const Vec3 detail{process.x - 0.65 * kDetail_mm, process.y - 0.55 * kDetail_mm, e.fullest_z};
-  out.push_back(view("across, at the pedicles",
-                     {{e.low.x - kMargin_mm, e.low.y - kMargin_mm, e.fullest_z}, {1, 0, 0}, {0, 1, 0}, size.x, size.y},
+  out.push_back(view("across, at the pedicles", {{low.x, low.y, e.fullest_z}, {1, 0, 0}, {0, 1, 0}, size.x, size.y},
                      0.25, 10, kPixel_mm));
-  out.push_back(view("along, in the middle",
-                     {{e.middle.x, e.low.y - kMargin_mm, e.high.z + kMargin_mm}, {0, 1, 0}, down_z, size.y, size.z},
-                     0.25, 10, kPixel_mm));
+  out.push_back(view("along, in the middle", {{e.middle.x, low.y, high.z}, {0, 1, 0}, down_z, size.y, size.z}, 0.25, 10,
+                     kPixel_mm));
   out.push_back(
       view("close, at a process", {detail, {1, 0, 0}, {0, 1, 0}, kDetail_mm, kDetail_mm}, 0.1, 2, kDetailPixel_mm));
   return out;
