@@ -1,5 +1,6 @@
 #include "server/jobs/case_files.h"
 
+#include "core/volume/crop.h"
 #include "core/wire/mesh_message.h"
 #include "core/wire/point_volume_message.h"
 
@@ -39,6 +40,21 @@ Result<rbf::Model> loadModel(store::Store& store, const store::Case& row) {
 
 Result<point_volume::PointVolume> loadPointVolume(store::Store& store, const store::Path& row) {
   return load(store, row.point_volume, "path " + row.id + " has no point volume", wire::decodePointVolume);
+}
+
+Result<Region> loadRegion(store::Store& store, const store::Case& row) {
+  const auto label = loadLabel(store, row);
+  if (!label) return tl::unexpected(label.error());
+  const auto ct = loadCt(store, row);
+  if (!ct) return tl::unexpected(ct.error());
+  const auto box = volume::boundsOf(*label);
+  if (!box) return tl::unexpected(box.error());
+  const auto wide = volume::widened(*box, ct->grid, kRoiMargin_mm);
+  auto ct_part = volume::cropTo(*ct, wide.low, wide.high);
+  if (!ct_part) return tl::unexpected(ct_part.error());
+  auto label_part = volume::cropTo(*label, wide.low, wide.high);
+  if (!label_part) return tl::unexpected(label_part.error());
+  return Region{std::move(*ct_part), std::move(*label_part)};
 }
 
 Result<void> checkLabelText(const std::string& text) {

@@ -7,32 +7,11 @@
 #include "core/mesh/parts.h"
 #include "core/mesh/polygonise.h"
 #include "core/surface/methods.h"
-#include "core/volume/crop.h"
 #include "core/wire/mesh_message.h"
 #include "server/jobs/case_files.h"
 
 namespace spinaltap::jobs {
 namespace {
-
-struct Region {
-  volume::CtVolume ct;
-  volume::LabelVolume label;
-};
-
-Result<Region> cropRegion(store::Store& store, const store::Case& row) {
-  const auto label = loadLabel(store, row);
-  if (!label) return tl::unexpected(label.error());
-  const auto ct = loadCt(store, row);
-  if (!ct) return tl::unexpected(ct.error());
-  const auto box = volume::boundsOf(*label);
-  if (!box) return tl::unexpected(box.error());
-  const auto roi = volume::widened(*box, ct->grid, kRoiMargin_mm);
-  auto ct_roi = volume::cropTo(*ct, roi.low, roi.high);
-  if (!ct_roi) return tl::unexpected(ct_roi.error());
-  auto label_roi = volume::cropTo(*label, roi.low, roi.high);
-  if (!label_roi) return tl::unexpected(label_roi.error());
-  return Region{std::move(*ct_roi), std::move(*label_roi)};
-}
 
 mesh::PolygoniseOptions meshOptions(const std::vector<Vec3>& points, double cell_mm, double margin_mm) {
   const Box box = boxAround(points).widened(margin_mm);
@@ -70,7 +49,7 @@ Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, 
   const auto row = store.findCase(job.case_id);
   if (!row) return tl::unexpected(row.error());
   if (progress) progress("load", 0);
-  const auto region = cropRegion(store, *row);
+  const auto region = loadRegion(store, *row);
   if (!region) return tl::unexpected(region.error());
   const double load_s = watch.lap_s();
 

@@ -18,9 +18,6 @@ struct ReconstructJob {
   double cell_mm = surface::kCell_mm;
 };
 
-/// The CT kept for the browser is the vertebra's box and this much around it.
-inline constexpr double kRoiMargin_mm = 15;
-
 /// Figures: the keys of server/cli/README.md. Stages: load, boundary, fit, mesh, keep.
 /// @error NotFound (no label yet), and those of surface, rbf and mesh.
 [[nodiscard]] Result<Figures> reconstructCase(store::Store& store, const ReconstructJob& job, const Progress& progress);

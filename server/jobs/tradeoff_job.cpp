@@ -5,10 +5,9 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
+#include <span>
 
-#include "core/volume/crop.h"
 #include "server/jobs/case_files.h"
 #include "server/jobs/tradeoff_plots.h"
 
@@ -18,7 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using tradeoff::Measured;
 
-constexpr double kMargin_mm = 15;  // of CT around the label
 constexpr double kTolerance_mm = 0.01;
 
 Result<tradeoff::Scene> sceneOf(store::Store* store, const TradeoffJob& job, const Progress& progress) {
@@ -32,18 +30,9 @@ Result<tradeoff::Scene> sceneOf(store::Store* store, const TradeoffJob& job, con
   if (store == nullptr) return fail(ErrorCode::InvalidArgument, "a case needs its data folder");
   const auto row = store->findCase(job.case_id);
   if (!row) return tl::unexpected(row.error());
-  auto label = loadLabel(*store, *row);
-  if (!label) return tl::unexpected(label.error());
-  const auto ct = loadCt(*store, *row);
-  if (!ct) return tl::unexpected(ct.error());
-  const auto box = volume::boundsOf(*label);
-  if (!box) return tl::unexpected(box.error());
-  const auto wide = volume::widened(*box, ct->grid, kMargin_mm);
-  auto ct_part = volume::cropTo(*ct, wide.low, wide.high);
-  if (!ct_part) return tl::unexpected(ct_part.error());
-  auto label_part = volume::cropTo(*label, wide.low, wide.high);
-  if (!label_part) return tl::unexpected(label_part.error());
-  return tradeoff::caseScene(std::move(*ct_part), std::move(*label_part));
+  auto region = loadRegion(*store, *row);
+  if (!region) return tl::unexpected(region.error());
+  return tradeoff::caseScene(std::move(region->ct), std::move(region->label));
 }
 
 std::vector<tradeoff::Setting> settingsOf(const TradeoffJob& job) {
@@ -111,10 +100,8 @@ Result<Figures> writePictures(const std::string& folder, const std::vector<Pictu
   if (error) return fail(ErrorCode::Io, "cannot make the folder for the pictures: " + error.message());
   Figures files = Figures::array();
   for (const Picture& p : pictures) {
-    std::ofstream file(fs::path(folder) / p.file_name, std::ios::binary);
-    file.write(p.svg.data(), static_cast<std::streamsize>(p.svg.size()));
-    file.close();
-    if (!file) return fail(ErrorCode::Io, "cannot write " + p.file_name);
+    const auto written = store::replaceFile(fs::path(folder) / p.file_name, std::as_bytes(std::span(p.svg)));
+    if (!written) return tl::unexpected(written.error());
     files.push_back(p.file_name);
   }
   return files;
