@@ -77,8 +77,7 @@ class Seeds {
           const bool bone = hu_[v] > threshold_hu_;
           const bool column = (bone || !is_likeness) && depthIn(body, p).least() > kSeedDepth_mm;
           if (!column && !(pedicles && bone && body.canal && inPedicle(body, canal, p))) continue;
-          flood_.owner[v] = owner;
-          flood_.start[v] = kPedicleStart;
+          sow(v, owner, kPedicleStart);
           if (column) flood_.cost[v] = kUnit;  // marrow may be dark
         }
       }
@@ -103,18 +102,9 @@ class Seeds {
 
   /// Bone too far to the side for a transverse process: ribs, ilium.
   void sowSides(const Body& body) {
-    const Block& block = scene_.block;
-    std::size_t v = 0;
-    for (int k = 0; k < block.dims[2]; ++k) {
-      for (int j = 0; j < block.dims[1]; ++j) {
-        for (int i = 0; i < block.dims[0]; ++i, ++v) {
-          if (flood_.cost[v] == kWall || flood_.owner[v] != kNobody || hu_[v] < threshold_hu_) continue;
-          if (std::abs(body.frame.toLocal(block.place(i, j, k)).x) < kSpan * body.half_width_mm) continue;
-          flood_.owner[v] = kOther;
-          flood_.start[v] = 0;
-        }
-      }
-    }
+    eachUnowned([&](std::size_t v, const Vec3& place) {
+      if (std::abs(body.frame.toLocal(place).x) >= kSpan * body.half_width_mm) sow(v, kOther, 0);
+    });
   }
 
   /// The first bone behind the canal, near the middle plane: the lamina lies there at the height of the body's lower
@@ -128,24 +118,32 @@ class Seeds {
   }
 
  private:
-  /// Calls use(voxel, where) for the bone behind a body that nobody owns.
+  /// Calls use(voxel, place) for the bone that nobody owns.
   template <class Use>
-  void eachBehind(const Body& body, const Use& use) {
-    if (!body.canal) return;
-    const Vec3 canal = body.frame.toLocal(*body.canal);
+  void eachUnowned(const Use& use) {
     const Block& block = scene_.block;
     std::size_t v = 0;
     for (int k = 0; k < block.dims[2]; ++k) {
       for (int j = 0; j < block.dims[1]; ++j) {
         for (int i = 0; i < block.dims[0]; ++i, ++v) {
           if (flood_.cost[v] == kWall || flood_.owner[v] != kNobody || hu_[v] < threshold_hu_) continue;
-          const Vec3 p = body.frame.toLocal(block.place(i, j, k));
-          if (p.y < body.back_mm + 2) continue;
-          use(v, {std::abs(p.x - canal.x) / body.half_width_mm, (p.y - canal.y) / body.half_width_mm,
-                  p.z / body.height_mm});
+          use(v, block.place(i, j, k));
         }
       }
     }
+  }
+
+  /// Calls use(voxel, where) for the bone behind a body that nobody owns.
+  template <class Use>
+  void eachBehind(const Body& body, const Use& use) {
+    if (!body.canal) return;
+    const Vec3 canal = body.frame.toLocal(*body.canal);
+    eachUnowned([&](std::size_t v, const Vec3& place) {
+      const Vec3 p = body.frame.toLocal(place);
+      if (p.y < body.back_mm + 2) return;
+      use(v,
+          {std::abs(p.x - canal.x) / body.half_width_mm, (p.y - canal.y) / body.half_width_mm, p.z / body.height_mm});
+    });
   }
 
   void sow(std::size_t v, std::uint8_t owner, std::uint16_t start) { flood_.owner[v] = owner, flood_.start[v] = start; }
@@ -164,8 +162,7 @@ class Seeds {
       const Vec3 at = scene_.block.voxelAt(place);
       const std::size_t v = scene_.block.index(static_cast<int>(std::lround(at.x)), static_cast<int>(std::lround(at.y)),
                                                static_cast<int>(std::lround(at.z)));
-      flood_.owner[v] = owner;
-      flood_.start[v] = 0;
+      sow(v, owner, 0);
     }
   }
 
