@@ -12,56 +12,79 @@ HWY_BEFORE_NAMESPACE();
 namespace spinaltap::rbf::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Where the machine estimates reciprocal roots, that and Newton's rule cost half of a root.
+// Where the machine estimates reciprocal roots, that and a series cost a third of a root.
 constexpr bool kHasEstimate = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
 
-/// The root of a square, and its reciprocal; 0 and 0 for 0.
+/// The root of a square, and its reciprocal, begun with an estimate.
 struct Estimated {
+  // Of what an estimate of twelve bits leaves, so many terms of the root's series leave less than a double's rounding; of
+  // one of fourteen bits, one fewer.
+  static constexpr int kTerms = HWY_TARGET == HWY_AVX3 ? 3 : 4;
   static constexpr double kTiny = 1e-30;
 
+  /// A hair more than the square, so that the reciprocal is finite.
+  template <class D, class V = hn::Vec<D>>
+  static HWY_INLINE V square(D d, V x, V y, V z) {
+    const V tiny = hn::Set(d, static_cast<hn::TFromD<D>>(kTiny));
+    return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::MulAdd(z, z, tiny)));
+  }
   template <class D, class V = hn::Vec<D>>
   static HWY_INLINE V reciprocalEstimate(D d, V square) {
     if constexpr (sizeof(hn::TFromD<D>) == 4) {
       return hn::ApproximateReciprocalSqrt(square);
     } else {
+#if HWY_TARGET == HWY_AVX3
+      (void)d;
+      return V{_mm512_rsqrt14_pd(square.raw)};
+#else
       const hn::Rebind<float, D> df;
       return hn::PromoteTo(d, hn::ApproximateReciprocalSqrt(hn::DemoteTo(df, square)));
+#endif
     }
   }
-  /// One step: the relative error e becomes 1.5 e^2.
+  /// v (1 - error)^(-1/2).
   template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V refined(D d, V square, V q) {
-    const V half = hn::Set(d, static_cast<hn::TFromD<D>>(0.5));
-    const V error = hn::NegMulAdd(hn::Mul(square, q), hn::Mul(q, half), half);
-    return hn::MulAdd(q, error, q);
+  static HWY_INLINE V corrected(D d, V v, V error) {
+    using T = hn::TFromD<D>;
+    V series = hn::Set(d, static_cast<T>(0.5));
+    if constexpr (sizeof(T) == 8) {
+      constexpr double kSeries[] = {0.5, 3.0 / 8, 5.0 / 16, 35.0 / 128};
+      series = hn::Set(d, kSeries[kTerms - 1]);
+      for (int n = kTerms - 1; n-- > 0;) series = hn::MulAdd(series, error, hn::Set(d, kSeries[n]));
+    }
+    return hn::MulAdd(hn::Mul(v, error), series, v);
   }
   template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V root(D d, V square_or_0) {
+  static HWY_INLINE V root(D d, V square) {
+    using T = hn::TFromD<D>;
     if constexpr (!kHasEstimate) {
-      return hn::Sqrt(square_or_0);
+      return hn::Sqrt(square);
     } else {
-      const V half = hn::Set(d, static_cast<hn::TFromD<D>>(0.5));
-      const V square = hn::Add(square_or_0, hn::Set(d, static_cast<hn::TFromD<D>>(kTiny)));
-      V q = reciprocalEstimate(d, square);
-      if constexpr (sizeof(hn::TFromD<D>) == 8) q = refined(d, square, q);
-      const V root = hn::Mul(square, q);
-      return hn::MulAdd(hn::NegMulAdd(root, root, square), hn::Mul(q, half), root);
+      const V q = reciprocalEstimate(d, square), root = hn::Mul(square, q);
+      if constexpr (sizeof(T) == 8) {
+        return corrected(d, root, hn::NegMulAdd(root, q, hn::Set(d, T{1})));
+      } else {  // the product's own rounding is corrected, too
+        return hn::MulAdd(hn::NegMulAdd(root, root, square), hn::Mul(q, hn::Set(d, T{0.5})), root);
+      }
     }
   }
   template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V reciprocal(D d, V square_or_0) {
-    const V square = hn::Add(square_or_0, hn::Set(d, static_cast<hn::TFromD<D>>(kTiny)));
+  static HWY_INLINE V reciprocal(D d, V square) {
+    using T = hn::TFromD<D>;
     if constexpr (!kHasEstimate) {
-      return hn::Div(hn::Set(d, static_cast<hn::TFromD<D>>(1)), hn::Sqrt(square));
+      return hn::Div(hn::Set(d, T{1}), hn::Sqrt(square));
     } else {
-      V q = reciprocalEstimate(d, square);
-      if constexpr (sizeof(hn::TFromD<D>) == 8) q = refined(d, square, q);
-      return refined(d, square, q);
+      const V q = reciprocalEstimate(d, square);
+      return corrected(d, q, hn::NegMulAdd(hn::Mul(square, q), q, hn::Set(d, T{1})));
     }
   }
 };
 
 struct Exact {
+  template <class D, class V = hn::Vec<D>>
+  static HWY_INLINE V square(D, V x, V y, V z) {
+    return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
+  }
   template <class D, class V = hn::Vec<D>>
   static HWY_INLINE V root(D, V square) {
     return hn::Sqrt(square);
@@ -149,10 +172,8 @@ void distances(const PointArrays<T>& targets, const PointArrays<T>& sources, con
         const auto weight = hn::Set(d, w[j]);
         const auto ax = hn::Sub(xa, sx), ay = hn::Sub(ya, sy), az = hn::Sub(za, sz);
         const auto bx = hn::Sub(xb, sx), by = hn::Sub(yb, sy), bz = hn::Sub(zb, sz);
-        const auto a2 = hn::MulAdd(ax, ax, hn::MulAdd(ay, ay, hn::Mul(az, az)));
-        const auto b2 = hn::MulAdd(bx, bx, hn::MulAdd(by, by, hn::Mul(bz, bz)));
-        sum_a = hn::MulAdd(weight, Root::root(d, a2), sum_a);
-        sum_b = hn::MulAdd(weight, Root::root(d, b2), sum_b);
+        sum_a = hn::MulAdd(weight, Root::root(d, Root::square(d, ax, ay, az)), sum_a);
+        sum_b = hn::MulAdd(weight, Root::root(d, Root::square(d, bx, by, bz)), sum_b);
       }
       total_a.add(sum_a), total_b.add(sum_b);
     }
@@ -179,8 +200,7 @@ void directions(const PointArrays<T>& targets, const PointArrays<T>& sources, co
       for (const std::size_t end = std::min(j + kRun<T>, sources.count); j < end; ++j) {
         const auto x = hn::Sub(tx, hn::Set(d, sources.x[j])), y = hn::Sub(ty, hn::Set(d, sources.y[j])),
                    z = hn::Sub(tz, hn::Set(d, sources.z[j]));
-        const auto square = hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
-        const auto share = hn::Mul(hn::Set(d, w[j]), Root::reciprocal(d, square));
+        const auto share = hn::Mul(hn::Set(d, w[j]), Root::reciprocal(d, Root::square(d, x, y, z)));
         gx = hn::MulAdd(share, x, gx), gy = hn::MulAdd(share, y, gy), gz = hn::MulAdd(share, z, gz);
       }
       total_x.add(gx), total_y.add(gy), total_z.add(gz);
@@ -217,8 +237,8 @@ void distancesBothWays(const PointArrays<double>& a, const double* HWY_RESTRICT 
         const auto weight = hn::Set(d, wb[from + j]);
         const auto ax = hn::Sub(xa, sx), ay = hn::Sub(ya, sy), az = hn::Sub(za, sz);
         const auto bx = hn::Sub(xb, sx), by = hn::Sub(yb, sy), bz = hn::Sub(zb, sz);
-        const auto ra = Estimated::root(d, hn::MulAdd(ax, ax, hn::MulAdd(ay, ay, hn::Mul(az, az))));
-        const auto rb = Estimated::root(d, hn::MulAdd(bx, bx, hn::MulAdd(by, by, hn::Mul(bz, bz))));
+        const auto ra = Estimated::root(d, Estimated::square(d, ax, ay, az));
+        const auto rb = Estimated::root(d, Estimated::square(d, bx, by, bz));
         sum_a = hn::MulAdd(weight, ra, sum_a);
         sum_b = hn::MulAdd(weight, rb, sum_b);
         double* const other = others + j * lanes;

@@ -14,7 +14,7 @@ struct PointArrays {
 };
 
 /// out[i] += sum_j w_j |t_i - s_j|, sources in their own order, so that a target's bits depend on its sources alone.
-/// The square root is an estimate refined by Newton's rule: relative error below 3e-14 (double), 3e-7 (single).
+/// The square root is an estimate refined by its series: relative error below 3e-14 (double), 3e-7 (single).
 /// @pre squared distances between 1e-28 and 1e37, or the points equal.
 void addDistances(const PointArrays<double>& targets, const PointArrays<double>& sources, const double* weights,
                   double* out);
