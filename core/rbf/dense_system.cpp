@@ -30,13 +30,13 @@ template <class T>
 DenseSystem<T>::DenseSystem(std::span<const Vec3> points, double ridge) : factor_(points.size()) {
   const Ball ball = ballOf(points);
   middle_ = ball.middle, scale_ = ball.radius;
-  std::vector<Vec3> p(points.size());
-  for (std::size_t i = 0; i < p.size(); ++i) p[i] = (points[i] - middle_) / scale_;
-  const T on_diagonal = static_cast<T>(2 + ridge / scale_);
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) factor_.at(i, j) = static_cast<T>(2 - norm(p[i] - p[j]));
-    factor_.at(i, i) = on_diagonal;
+  std::vector<T> at[3];
+  for (std::vector<T>& axis : at) axis.assign(factor_.paddedSize(), T{0});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3 p = (points[i] - middle_) / scale_;
+    at[0][i] = static_cast<T>(p.x), at[1][i] = static_cast<T>(p.y), at[2][i] = static_cast<T>(p.z);
   }
+  factor_.fill({at[0].data(), at[1].data(), at[2].data(), points.size()}, static_cast<T>(2 + ridge / scale_));
 }
 
 template <class T>

@@ -18,11 +18,14 @@ struct Gathered {
 
   void clear() { x.clear(), y.clear(), z.clear(), w.clear(); }
   void add(const PointArrays<double>& p, const double* weights, const Vec3& middle) {
-    for (std::size_t n = 0; n < p.count; ++n) {
-      x.push_back(static_cast<T>(p.x[n] - middle.x)), y.push_back(static_cast<T>(p.y[n] - middle.y));
-      z.push_back(static_cast<T>(p.z[n] - middle.z));
-      if (weights != nullptr) w.push_back(static_cast<T>(weights[n]));
-    }
+    const std::size_t first = x.size();
+    for (std::vector<T>* const axis : {&x, &y, &z}) axis->resize(first + p.count);
+    for (std::size_t n = 0; n < p.count; ++n) x[first + n] = static_cast<T>(p.x[n] - middle.x);
+    for (std::size_t n = 0; n < p.count; ++n) y[first + n] = static_cast<T>(p.y[n] - middle.y);
+    for (std::size_t n = 0; n < p.count; ++n) z[first + n] = static_cast<T>(p.z[n] - middle.z);
+    if (weights == nullptr) return;
+    w.resize(first + p.count);
+    for (std::size_t n = 0; n < p.count; ++n) w[first + n] = static_cast<T>(weights[n]);
   }
   void addAll(const Gathered<double>& from) {
     for (std::size_t n = 0; n < from.x.size(); ++n) {

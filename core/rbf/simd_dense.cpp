@@ -155,6 +155,42 @@ bool factorTile(T* own, T* inverse_pivots) {
   return true;
 }
 
+/// A factored tile on the diagonal by its inverse: solves are products with that, without a chain of divisions.
+template <class T>
+void invertTile(const T* inverse_pivots, T* own) {
+  const hn::ScalableTag<T> d;
+  const std::size_t lanes = hn::Lanes(d);
+  T inverse[kWidth * kWidth] = {};
+  for (std::size_t k = 0; k < kWidth; ++k) {
+    const T* const column = own + k * kWidth;
+    inverse[k * kWidth + k] = 1;
+    for (std::size_t c = 0; c <= k; ++c) {
+      T* const to = inverse + c * kWidth;
+      const T share = to[k] * inverse_pivots[k];
+      for (std::size_t r = k / lanes * lanes; r < kWidth; r += lanes)
+        hn::StoreU(hn::NegMulAdd(hn::Set(d, share), hn::LoadU(d, column + r), hn::LoadU(d, to + r)), d, to + r);
+      to[k] = share;
+    }
+  }
+  std::copy(inverse, inverse + kWidth * kWidth, own);
+}
+
+/// own(r, c) = 2 - |rows_r - columns_c|.
+template <class T>
+void fillTile(const PointArrays<T>& rows, const PointArrays<T>& columns, T* own) {
+  const hn::ScalableTag<T> d;
+  const auto two = hn::Set(d, T{2});
+  for (std::size_t c = 0; c < kWidth; ++c) {
+    const auto x = hn::Set(d, columns.x[c]), y = hn::Set(d, columns.y[c]), z = hn::Set(d, columns.z[c]);
+    for (std::size_t r = 0; r < kWidth; r += hn::Lanes(d)) {
+      const auto dx = hn::Sub(hn::LoadU(d, rows.x + r), x), dy = hn::Sub(hn::LoadU(d, rows.y + r), y),
+                 dz = hn::Sub(hn::LoadU(d, rows.z + r), z);
+      const auto square = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
+      hn::StoreU(hn::Sub(two, hn::Sqrt(square)), d, own + c * kWidth + r);
+    }
+  }
+}
+
 /// A tile below the diagonal: own <- own diagonal^-T.
 template <class T>
 void divideTile(const T* diagonal, const T* inverse_pivots, T* own) {
@@ -212,16 +248,21 @@ void subtractTransposedProduct(const T* tile, const T* HWY_RESTRICT x, T* HWY_RE
   }
 }
 
+/// own <- what `subtract` makes of 0 and -own.
+template <class T, class Subtract>
+void replaceBy(const Subtract& subtract, const T* tile, T* own) {
+  T negative[kWidth];
+  for (std::size_t r = 0; r < kWidth; ++r) negative[r] = -own[r], own[r] = 0;
+  subtract(tile, negative, own);
+}
+
 template <class T>
 void lowerSolve(const T* tiles, std::size_t count, T* x) {
   for (std::size_t row = 0; row < count; ++row) {
     T* const own = x + row * kWidth;
     for (std::size_t column = 0; column < row; ++column, tiles += kWidth * kWidth)
       subtractProduct(tiles, x + column * kWidth, own);
-    for (std::size_t c = 0; c < kWidth; ++c) {
-      own[c] /= tiles[c * kWidth + c];
-      for (std::size_t r = c + 1; r < kWidth; ++r) own[r] -= own[c] * tiles[c * kWidth + r];
-    }
+    replaceBy(subtractProduct<T>, tiles, own);
     tiles += kWidth * kWidth;
   }
 }
@@ -230,13 +271,8 @@ template <class T>
 void upperSolve(const T* tiles, std::size_t count, T* x) {
   for (std::size_t row = count; row-- > 0;) {
     const T* const row_tiles = tiles + row * (row + 1) / 2 * kWidth * kWidth;
-    const T* const diagonal = row_tiles + row * kWidth * kWidth;
     T* const own = x + row * kWidth;
-    for (std::size_t c = kWidth; c-- > 0;) {
-      T sum = own[c];
-      for (std::size_t r = c + 1; r < kWidth; ++r) sum -= own[r] * diagonal[c * kWidth + r];
-      own[c] = sum / diagonal[c * kWidth + c];
-    }
+    replaceBy(subtractTransposedProduct<T>, row_tiles + row * kWidth * kWidth, own);
     for (std::size_t column = 0; column < row; ++column)
       subtractTransposedProduct(row_tiles + column * kWidth * kWidth, own, x + column * kWidth);
   }
@@ -253,6 +289,14 @@ bool factorDouble(double* own, double* inverse_pivots) { return factorTile(own, 
 bool factorSingle(float* own, float* inverse_pivots) { return factorTile(own, inverse_pivots); }
 void divideDouble(const double* diagonal, const double* pivots, double* own) { divideTile(diagonal, pivots, own); }
 void divideSingle(const float* diagonal, const float* pivots, float* own) { divideTile(diagonal, pivots, own); }
+void invertDouble(const double* pivots, double* own) { invertTile(pivots, own); }
+void invertSingle(const float* pivots, float* own) { invertTile(pivots, own); }
+void fillDouble(const PointArrays<double>& rows, const PointArrays<double>& columns, double* own) {
+  fillTile(rows, columns, own);
+}
+void fillSingle(const PointArrays<float>& rows, const PointArrays<float>& columns, float* own) {
+  fillTile(rows, columns, own);
+}
 void lowerDouble(const double* tiles, std::size_t count, double* x) { lowerSolve(tiles, count, x); }
 void lowerSingle(const float* tiles, std::size_t count, float* x) { lowerSolve(tiles, count, x); }
 void upperDouble(const double* tiles, std::size_t count, double* x) { upperSolve(tiles, count, x); }
@@ -273,6 +317,10 @@ HWY_EXPORT(factorDouble);
 HWY_EXPORT(factorSingle);
 HWY_EXPORT(divideDouble);
 HWY_EXPORT(divideSingle);
+HWY_EXPORT(invertDouble);
+HWY_EXPORT(invertSingle);
+HWY_EXPORT(fillDouble);
+HWY_EXPORT(fillSingle);
 HWY_EXPORT(lowerDouble);
 HWY_EXPORT(lowerSingle);
 HWY_EXPORT(upperDouble);
@@ -291,6 +339,14 @@ void divideTile(const double* diagonal, const double* pivots, double* own) {
 }
 void divideTile(const float* diagonal, const float* pivots, float* own) {
   HWY_DYNAMIC_DISPATCH(divideSingle)(diagonal, pivots, own);
+}
+void invertTile(const double* pivots, double* own) { HWY_DYNAMIC_DISPATCH(invertDouble)(pivots, own); }
+void invertTile(const float* pivots, float* own) { HWY_DYNAMIC_DISPATCH(invertSingle)(pivots, own); }
+void fillTile(const PointArrays<double>& rows, const PointArrays<double>& columns, double* own) {
+  HWY_DYNAMIC_DISPATCH(fillDouble)(rows, columns, own);
+}
+void fillTile(const PointArrays<float>& rows, const PointArrays<float>& columns, float* own) {
+  HWY_DYNAMIC_DISPATCH(fillSingle)(rows, columns, own);
 }
 
 // A column of fewer tiles than this is not worth sharing among threads.
@@ -314,6 +370,18 @@ TiledCholesky<T>::TiledCholesky(std::size_t size)
 }
 
 template <class T>
+void TiledCholesky<T>::fill(const PointArrays<T>& points, T diagonal) {
+  const auto part = [&](std::size_t t) {
+    return PointArrays<T>{points.x + t * kTile, points.y + t * kTile, points.z + t * kTile, kTile};
+  };
+  for (std::size_t r = 0; r < tiles_; ++r)
+    for (std::size_t c = 0; c <= r; ++c) fillTile(part(r), part(c), tile(r, c));
+  for (std::size_t r = 0; r < size_; ++r) at(r, r) = diagonal;
+  for (std::size_t r = size_; r < paddedSize(); ++r)
+    for (std::size_t c = 0; c <= r; ++c) at(r, c) = r == c ? T{1} : T{0};
+}
+
+template <class T>
 bool TiledCholesky<T>::factor(unsigned threads) {
   T pivots[kTile];
   for (std::size_t c = 0; c < tiles_; ++c) {
@@ -326,6 +394,7 @@ bool TiledCholesky<T>::factor(unsigned threads) {
         divideTile(tile(c, c), pivots, tile(r, c));
       }
     });
+    invertTile(pivots, tile(c, c));
   }
   return true;
 }

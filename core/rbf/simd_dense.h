@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/rbf/simd_sums.h"
+
 namespace spinaltap::rbf {
 
 /// y(:, c) = A x(:, c): A is rows x inner, x inner x columns, y rows x columns, all column-major with these strides.
@@ -14,7 +16,8 @@ void multiply(const float* a, std::size_t rows, std::size_t inner, const float* 
 
 /// L with L L^T = A for a symmetric positive definite matrix, in square tiles of 48: only those on and below the
 /// diagonal are stored, each in one piece, so that a product of two tiles runs through memory in order. Left-looking: a
-/// column of tiles is updated by all columns before it in one long product.
+/// column of tiles is updated by all columns before it in one long product. Once factored, a tile on the diagonal is
+/// kept by its inverse.
 template <class T>
 class TiledCholesky {
  public:
@@ -29,6 +32,9 @@ class TiledCholesky {
   [[nodiscard]] T& at(std::size_t row, std::size_t column) {
     return tile(row / kTile, column / kTile)[column % kTile * kTile + row % kTile];
   }
+
+  /// A(r, c) = 2 - |p_r - p_c|, and the diagonal. @pre the points' arrays are paddedSize() long.
+  void fill(const PointArrays<T>& points, T diagonal);
 
   /// False when a pivot is lost in the rounding of A's own diagonal: not positive definite in T.
   [[nodiscard]] bool factor(unsigned threads = 1);

@@ -17,8 +17,8 @@ constexpr bool kHasEstimate = HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3;
 
 /// The root of a square, and its reciprocal, begun with an estimate.
 struct Estimated {
-  // Of what an estimate of twelve bits leaves, so many terms of the root's series leave less than a double's rounding; of
-  // one of fourteen bits, one fewer.
+  // Of what an estimate of twelve bits leaves, so many terms of the root's series leave less than a double's rounding;
+  // of one of fourteen bits, one fewer.
   static constexpr int kTerms = HWY_TARGET == HWY_AVX3 ? 3 : 4;
   static constexpr double kTiny = 1e-30;
 

@@ -144,6 +144,32 @@ TEST(TiledCholesky, SolvesWhatItFactoredForSizesAroundItsTiles) {
   }
 }
 
+template <class T>
+void expectFilled(std::size_t n, double rounding) {
+  Random random(n + 7);
+  std::vector<Vec3> points;
+  TiledCholesky<T> tiled(n);
+  std::vector<T> x(tiled.paddedSize(), T{0}), y = x, z = x;
+  for (std::size_t i = 0; i < n; ++i) {
+    points.push_back(randomPoint(random, 0.5));
+    x[i] = static_cast<T>(points[i].x), y[i] = static_cast<T>(points[i].y), z[i] = static_cast<T>(points[i].z);
+  }
+  tiled.fill({x.data(), y.data(), z.data(), n}, T{3});
+  for (std::size_t i = 0; i < tiled.paddedSize(); ++i)
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double own = i < n ? 3 : 1, other = i < n ? 2 - norm(points[i] - points[j]) : 0;
+      EXPECT_NEAR(static_cast<double>(tiled.at(i, j)), i == j ? own : other, rounding) << i << " " << j;
+    }
+}
+
+TEST(TiledCholesky, IsFilledWithTheKernelAndAUnitMatrixBeyondIt) {
+  for (const std::size_t n : {1UL, 48UL, 100UL}) {
+    // Of coordinates, their distance and two less that: four roundings of numbers below two.
+    expectFilled<double>(n, 4 * 2.3e-16);
+    expectFilled<float>(n, 4 * 1.2e-7);
+  }
+}
+
 TEST(TiledCholesky, RefusesAMatrixThatIsNotPositiveDefinite) {
   TiledCholesky<double> two(2);
   two.at(0, 0) = two.at(1, 1) = 1, two.at(1, 0) = 1;
