@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/phantom/ct.h"
-#include "server/jobs/codec.h"
 #include "server/jobs/reconstruct_job.h"
+#include "tests/server/phantom_case.h"
 #include "tests/server/temporary_folder.h"
 
 namespace spinaltap::jobs {
@@ -27,26 +26,12 @@ struct Told {
   }
 };
 
-/// A phantom with its true label, in the store.
-std::string phantomCase(store::Store& store) {
-  const auto truth = phantom::Phantom::make({});
-  const auto ct = phantom::sampleCt(truth, phantom::CtOptions::coarser(4)).value();
-  store::Case row;
-  row.label = "phantom";
-  row.grid = ct.grid;
-  row.ct = store.blobs().put(encodeCt(ct)).value();
-  const std::string id = store.addCase(row).value().id;
-  const auto label = store.blobs().put(encodeLabel(phantom::truthLabel(truth, ct.grid))).value();
-  EXPECT_TRUE(store.setLabel(id, label, "segmented").has_value());
-  return id;
-}
-
 TEST(ReconstructProgress, TellsEveryStageInOrderAndNeverGoesBack) {
   const test::TemporaryFolder folder;
   auto store = store::Store::open(folder.path());
   ASSERT_TRUE(store.has_value());
   ReconstructJob job;
-  job.case_id = phantomCase(*store);
+  job.case_id = test::phantomCase(*store);
   job.sample_spacing_mm = 2, job.cell_mm = 1.5;
   Told told;
   const auto figures = reconstructCase(*store, job, told.listener());
@@ -71,7 +56,7 @@ TEST(ReconstructProgress, AMethodIsKeptWithTheSurface) {
   auto store = store::Store::open(folder.path());
   ASSERT_TRUE(store.has_value());
   ReconstructJob job;
-  job.case_id = phantomCase(*store);
+  job.case_id = test::phantomCase(*store);
   job.method = surface::Method::Normal;
   job.cell_mm = 2;
   const auto figures = reconstructCase(*store, job, {});
