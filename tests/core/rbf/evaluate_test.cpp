@@ -51,7 +51,7 @@ TEST(Evaluator, StaysWithinItsToleranceOfTheOracleForValuesAndTheirSlopes) {
   for (int i = 0; i < 3000; ++i) points.push_back(Vec3{10, 20, 30} + randomPoint(random, 25));
   for (int i = 0; i < 200; ++i) points.push_back(s.positions[static_cast<std::size_t>(i)]);           // on centres
   for (int i = 0; i < 50; ++i) points.push_back(randomDirection(random) * random.uniform(1e3, 1e7));  // far away
-  for (int i = 0; i < 300; ++i) points.push_back(Vec3{10, 20, 30} + randomPoint(random, 60));         // around
+  for (int i = 0; i < 3000; ++i) points.push_back(Vec3{10, 20, 30} + randomPoint(random, 60));        // around
   std::vector<double> direct(points.size()), fast(points.size());
   std::vector<Vec3> direct_slope(points.size()), fast_slope(points.size());
   evaluate(m, points, direct);
@@ -66,6 +66,36 @@ TEST(Evaluator, StaysWithinItsToleranceOfTheOracleForValuesAndTheirSlopes) {
       if (i >= 3000 && i < 3200) continue;  // a centre's own direction turns about there
       // An error that varies over the smallest cubes, some 3 mm, with polynomials of degree up to 7.
       ASSERT_LT(norm(fast_slope[i] - direct_slope[i]), tolerance * 49 / 1.5 + 1e-6) << "seed 24, point " << i;
+    }
+  }
+}
+
+TEST(Evaluator, IsFastAsFarAsFourRadiiAndTheOracleItselfBeyond) {
+  Model m = someModel(1000, 26);
+  m.radius_mm = 70;  // of a ball around a cube of half side 40: the cube that is prepared for has 50
+  m.constant = 1e6;  // else the bound beyond the ball hides the sums
+  const Evaluator evaluator(m, 1e-2);
+  struct Shell {
+    double from_mm, to_mm;
+    bool fast;
+  };
+  Random random(27);
+  for (const Shell& shell : {Shell{0, 50, true}, Shell{90, 279, true}, Shell{281, 1e6, false}}) {
+    std::vector<Vec3> points;
+    for (int i = 0; i < 5000; ++i)
+      points.push_back(m.centroid_patient + randomDirection(random) * random.uniform(shell.from_mm, shell.to_mm));
+    std::vector<double> direct(points.size()), fast(points.size());
+    evaluate(m, points, direct);
+    evaluator.values(points, fast);
+    std::size_t equal = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      ASSERT_NEAR(fast[i], direct[i], 1e-2) << "seed 27, point " << i << " from " << shell.from_mm << " mm";
+      equal += fast[i] == direct[i] ? 1 : 0;
+    }
+    // What polynomials tell has other last bits than what is summed.
+    EXPECT_EQ(equal > points.size() / 2, !shell.fast) << equal << " equal, from " << shell.from_mm << " mm";
+    if (!shell.fast) {
+      EXPECT_EQ(equal, points.size());
     }
   }
 }

@@ -109,6 +109,26 @@ TEST(DirectSum, OverAllPairsHasTheSameBitsFromAnyNumberOfThreads) {
   for (std::size_t i = 0; i < 3000; i += 101) EXPECT_NEAR(one[i], plainDistance(p, p.sources[i]), 3000 * 35 * 4e-14);
 }
 
+TEST(DirectSum, FromOtherSourcesIsThePlainSumForEveryNumberOfLanesAndThreads) {
+  // About the lanes of any vector, and about the rows that a thread takes.
+  for (const std::size_t targets : {1UL, 3UL, 4UL, 5UL, 15UL, 16UL, 17UL, 63UL, 64UL, 65UL, 129UL}) {
+    for (const std::size_t sources : {1UL, 2UL, 7UL, 8UL, 9UL, 31UL, 32UL, 33UL, 257UL}) {
+      const std::uint64_t seed = 50'000 + targets * 1000 + sources;
+      const Pairs p = pairs(targets, sources, seed);
+      ASSERT_EQ(p.targets[0], p.sources[0]) << "one distance has to be 0";
+      const Vec3 origin{1, -2, 3};
+      const Coordinates t(p.targets, origin), s(p.sources, origin);
+      const std::vector<double> out = distancesFrom(t, s, p.weights, 1);
+      ASSERT_EQ(out.size(), targets);
+      EXPECT_EQ(out, distancesFrom(t, s, p.weights, 3)) << "seed " << seed;
+      // Terms up to 35, each with the root's stated error and two roundings; the origin costs one of 13 an axis.
+      const double tolerance = static_cast<double>(sources) * (35 * (3e-14 + 4.6e-16) + 4 * 1.8e-15);
+      for (std::size_t i = 0; i < targets; ++i)
+        ASSERT_NEAR(out[i], plainDistance(p, p.targets[i]), tolerance) << "seed " << seed << ", point " << i;
+    }
+  }
+}
+
 template <class T>
 void expectFactors(std::size_t n, double tolerance) {
   Random random(n);
