@@ -66,26 +66,14 @@ void Chebyshev::gather(const PointArrays<double>& points, const double* weights,
     for (std::size_t c = 0; c < p; ++c) values[r * p + c] += rows[r * stride + c];
 }
 
-namespace {
-std::vector<double> paddedRows(std::size_t p, const double* values) {
-  const std::size_t stride = strideOf(static_cast<int>(p));
-  std::vector<double> rows(p * p * stride, 0.0);
-  for (std::size_t r = 0; r < p * p; ++r)
-    for (std::size_t c = 0; c < p; ++c) rows[r * stride + c] = values[r * p + c];
-  return rows;
-}
-}  // namespace
-
 void Chebyshev::spread(const double* values, const double middle[3], double half, const PointArrays<double>& points,
                        double* out) const {
-  const std::vector<double> rows = paddedRows(static_cast<std::size_t>(p_), values);
-  spreadValues(cubeOf(p_, basis_, middle, half), rows.data(), points, out);
+  spreadValues(cubeOf(p_, basis_, middle, half), values, points, out);
 }
 
 void Chebyshev::spreadGradient(const double* values, const double middle[3], double half,
                                const PointArrays<double>& points, double* x, double* y, double* z) const {
-  const std::vector<double> rows = paddedRows(static_cast<std::size_t>(p_), values);
-  spreadGradients(cubeOf(p_, basis_, middle, half), rows.data(), points, x, y, z);
+  spreadGradients(cubeOf(p_, basis_, middle, half), values, points, x, y, z);
 }
 
 Transfer::Transfer(const Chebyshev& coarse, const Chebyshev& fine, const std::array<Place, 2>& places)

@@ -6,17 +6,18 @@
 
 namespace spinaltap::rbf {
 
-/// A cube and its interpolation: rows of p values are padded to `stride`, a multiple of 8.
+/// A cube and its interpolation.
 struct CubeBasis {
   int nodes;
-  std::size_t stride;
+  std::size_t stride;   ///< of the basis, a multiple of 8
   const double* basis;  ///< p x stride, as Chebyshev::basis_
   double middle[3];
   double half;
 };
 
-/// values: p x p rows of stride.
+/// values: p x p rows of stride, the multiple of 8 above p.
 void gatherWeights(const CubeBasis& cube, const PointArrays<double>& points, const double* weights, double* values);
+/// values: p x p x p.
 void spreadValues(const CubeBasis& cube, const double* values, const PointArrays<double>& points, double* out);
 void spreadGradients(const CubeBasis& cube, const double* values, const PointArrays<double>& points, double* out_x,
                      double* out_y, double* out_z);
