@@ -1,5 +1,6 @@
 #include "core/rbf/chebyshev.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
@@ -16,29 +17,6 @@ CubeBasis cubeOf(int p, const std::vector<double>& basis, const double middle[3]
   return {p, strideOf(p), basis.data(), {middle[0], middle[1], middle[2]}, half};
 }
 
-/// out(a, ., .) = sum_b m(a, b) in(b, ., .), and the axes turned: (a, b, c) -> (b, c, a). Three times is all axes.
-void applyAndTurn(const std::vector<double>& m, std::size_t rows, std::size_t columns, std::size_t rest,
-                  const double* in, double* out) {
-  double sums[Chebyshev::kMost * Chebyshev::kMost];
-  for (std::size_t a = 0; a < rows; ++a) {
-    for (std::size_t n = 0; n < rest; ++n) sums[n] = m[a * columns] * in[n];
-    for (std::size_t b = 1; b < columns; ++b)
-      for (std::size_t n = 0; n < rest; ++n) sums[n] += m[a * columns + b] * in[b * rest + n];
-    for (std::size_t n = 0; n < rest; ++n) out[n * rows + a] = sums[n];
-  }
-}
-
-/// One matrix an axis: from `from` to `to` nodes an axis, added to out.
-void applyToAxes(const std::vector<double>* const matrices[3], std::size_t to, std::size_t from, const double* in,
-                 double* out) {
-  constexpr std::size_t kMost = Chebyshev::kMost, kRoom = kMost * kMost * kMost;
-  double a[kRoom], b[kRoom];
-  applyAndTurn(*matrices[0], to, from, from * from, in, a);
-  applyAndTurn(*matrices[1], to, from, from * to, a, b);
-  applyAndTurn(*matrices[2], to, from, to * to, b, a);
-  for (std::size_t n = 0; n < to * to * to; ++n) out[n] += a[n];
-}
-
 }  // namespace
 
 Chebyshev::Chebyshev(int nodes) : p_(nodes) {
@@ -52,9 +30,42 @@ Chebyshev::Chebyshev(int nodes) : p_(nodes) {
   for (std::size_t k = 0; k < p; ++k) {
     for (std::size_t a = 0; a < p; ++a) {
       const double angle = kPi * (static_cast<double>(a) + 0.5) / count;
-      basis_[k * stride + a] = (k == 0 ? 1.0 : 2.0) / count * std::cos(static_cast<double>(k) * angle);
+      const double value = std::cos(static_cast<double>(k) * angle);
+      basis_[k * stride + a] = (k == 0 ? 1.0 : 2.0) / count * value;
+      at_nodes_.push_back(value), interpolating_.push_back(basis_[k * stride + a]);
     }
   }
+  turned_over_.resize(p * p);
+  for (std::size_t k = 0; k < p; ++k)
+    for (std::size_t a = 0; a < p; ++a) turned_over_[a * p + k] = at_nodes_[k * p + a];
+  listTerms();
+}
+
+void Chebyshev::listTerms() {
+  const auto square = [](const Term& t) { return t[0] * t[0] + t[1] * t[1] + t[2] * t[2]; };
+  for (int i = 0; i < p_; ++i)
+    for (int j = 0; j < p_; ++j)
+      for (int k = 0; k < p_; ++k)
+        if (i * i + j * j + k * k < p_ * p_)
+          terms_.push_back({static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(j), static_cast<std::uint8_t>(k)});
+  std::stable_sort(terms_.begin(), terms_.end(), [&](const Term& a, const Term& b) { return square(a) < square(b); });
+  for (const Term& t : terms_) place_.push_back(static_cast<std::uint16_t>((t[0] * p_ + t[1]) * p_ + t[2]));
+}
+
+void Chebyshev::addTerms(const std::vector<double>& matrix, const double* values, double* terms) const {
+  const double* const m[3] = {matrix.data(), matrix.data(), matrix.data()};
+  const auto p = static_cast<std::size_t>(p_);
+  double all[kMost * kMost * kMost] = {};
+  applyToAxes(m, p, p, values, all);
+  for (std::size_t n = 0; n < place_.size(); ++n) terms[n] += all[place_[n]];
+}
+
+void Chebyshev::fromTerms(const double* terms, double* values) const {
+  const double* const m[3] = {turned_over_.data(), turned_over_.data(), turned_over_.data()};
+  const auto p = static_cast<std::size_t>(p_);
+  double all[kMost * kMost * kMost] = {};
+  for (std::size_t n = 0; n < place_.size(); ++n) all[place_[n]] = terms[n];
+  applyToAxes(m, p, p, all, values);
 }
 
 void Chebyshev::gather(const PointArrays<double>& points, const double* weights, const double middle[3], double half,
@@ -98,17 +109,13 @@ Transfer Transfer::toOctants(const Chebyshev& parent, const Chebyshev& child) {
   return {parent, child, {Place{-0.5, 0.5}, Place{0.5, 0.5}}};
 }
 
-Transfer Transfer::within(const Chebyshev& coarse, const Chebyshev& fine) {
-  return {coarse, fine, {Place{0, 1}, Place{0, 1}}};
-}
-
 void Transfer::toCoarse(int octant, const double* fine, double* coarse) const {
-  const std::vector<double>* const m[3] = {&up_[octant & 1], &up_[octant >> 1 & 1], &up_[octant >> 2 & 1]};
+  const double* const m[3] = {up_[octant & 1].data(), up_[octant >> 1 & 1].data(), up_[octant >> 2 & 1].data()};
   applyToAxes(m, coarse_, fine_, fine, coarse);
 }
 
 void Transfer::toFine(int octant, const double* coarse, double* fine) const {
-  const std::vector<double>* const m[3] = {&down_[octant & 1], &down_[octant >> 1 & 1], &down_[octant >> 2 & 1]};
+  const double* const m[3] = {down_[octant & 1].data(), down_[octant >> 1 & 1].data(), down_[octant >> 2 & 1].data()};
   applyToAxes(m, fine_, coarse_, coarse, fine);
 }
 

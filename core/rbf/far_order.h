@@ -28,9 +28,10 @@ struct FarKind {
 /// The same of single precision.
 inline constexpr double kFarSingleError = 4e-8;
 
-/// The distances between the nodes of two cubes, for each kind that was asked for. A distance is the cubes' own, plus
-/// how far the nodes are along the line between them, plus a small rest: only the rest, a tenth as large, is in the
-/// matrices, so that single precision carries further.
+/// How the terms of one cube's weights become those of another's values, for each kind that was asked for. A distance
+/// is the cubes' own, plus how far the points are along the line between them, plus a small rest: only the rest, a
+/// tenth as large, is in the matrices, so that single precision carries further. Of the rest's p^6 coefficients, those
+/// outside a ball of six dimensions are less than its interpolant's own error: a sixth and less of them counts.
 class FarOrder {
  public:
   /// @param single whether the matrices are kept, and multiplied, in single precision.
@@ -40,18 +41,25 @@ class FarOrder {
   void prepare(int kind);
 
   [[nodiscard]] const Chebyshev& chebyshev() const { return chebyshev_; }
-  /// How far apart two cubes of this kind are, and how far node n of a cube is along the line to the other, both cubes
-  /// of half side 1.
-  [[nodiscard]] double distance(int kind) const;
-  [[nodiscard]] const std::vector<double>& along(int kind) const { return along_[static_cast<std::size_t>(kind)]; }
+  [[nodiscard]] std::size_t terms() const { return chebyshev_.terms().size(); }
+  [[nodiscard]] std::size_t stored() const { return Chebyshev::padded(terms()); }
+  /// Products that one pair of cubes takes.
+  [[nodiscard]] std::size_t products() const;
+  /// How far apart two cubes of this kind are, both of half side 1, and how much farther with terms 1, 2, 3, which are
+  /// z, y, x.
+  [[nodiscard]] static double distance(int kind);
+  [[nodiscard]] static std::array<double, 3> direction(int kind);
   [[nodiscard]] bool single() const { return single_precision_; }
-  /// Node n of a cube is node turns(turn)[n] of the turned cube.
-  [[nodiscard]] const std::vector<std::uint16_t>& turned(int turn) const {
-    return turns_[static_cast<std::size_t>(turn)];
-  }
 
-  /// y(:, c) = R x(:, c) for cubes of half side 1, with R(t, s) = |distance| - distance(kind) - along[s] + along[t]:
-  /// columns of values() weights, to columns of stored() sums.
+  /// Term n of a cube is sign[n] times term[n] of the turned cube.
+  struct Turn {
+    std::vector<std::uint16_t> term;
+    std::vector<double> sign;
+  };
+  [[nodiscard]] const Turn& turned(int turn) const { return turns_[static_cast<std::size_t>(turn)]; }
+
+  /// y(:, c) = R x(:, c) for cubes of half side 1, R being |distance| - distance(kind) less the points' directions:
+  /// columns of terms() weights, to columns of stored() coefficients.
   /// @pre the kind is prepared, and T is float if single(), else double.
   void see(int kind, const float* x, std::size_t columns, float* y) const;
   void see(int kind, const double* x, std::size_t columns, double* y) const;
@@ -59,8 +67,9 @@ class FarOrder {
  private:
   Chebyshev chebyshev_;
   bool single_precision_;
-  std::array<std::vector<std::uint16_t>, FarKind::kTurns> turns_;
-  std::array<std::vector<double>, FarKind::kCount> along_, double_;
+  std::vector<std::uint32_t> lengths_;  ///< of the matrices' rows
+  std::array<Turn, FarKind::kTurns> turns_;
+  std::array<std::vector<double>, FarKind::kCount> double_;
   std::array<std::vector<float>, FarKind::kCount> single_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace spinaltap::rbf {
 namespace {
@@ -65,24 +66,28 @@ void FastSources::makeLevels(const Orders& chosen) {
   };
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     Level& level = levels_.emplace_back();
-    level.nodes = nodes[n], level.first = {0};
-    for (int part = nodes[n]; part >= nodesFor(FarKind::kCount - 1, nodes[n]); --part) {
-      level.orders.push_back(orderOf(part, n));
-      level.first.push_back(level.first.back() + orderOf(part, n)->chebyshev().stored());
-      if (part < nodes[n])
-        level.narrower.push_back(Transfer::within(orderOf(part, n)->chebyshev(), orderOf(part + 1, n)->chebyshev()));
-    }
+    level.nodes = nodes[n];
+    for (int count = nodes[n]; count >= nodesFor(FarKind::kCount - 1, nodes[n]); --count)
+      level.orders.push_back(orderOf(count, n));
+    level.terms = level.orders[0]->chebyshev().stored(), level.length = level.terms + level.orders[0]->stored();
     if (n > 0)
       level.octants = std::make_unique<const Transfer>(
           Transfer::toOctants(orderOf(nodes[n - 1], n - 1)->chebyshev(), orderOf(nodes[n], n)->chebyshev()));
   }
+  std::vector<std::pair<FarOrder*, int>> wanted;
   for (std::size_t n = kFirstFar; n < nodes.size(); ++n)
-    for (int kind = 0; kind < FarKind::kCount; ++kind) orderOf(nodesFor(kind, nodes[n]), n)->prepare(kind);
+    for (int kind = 0; kind < FarKind::kCount; ++kind)
+      wanted.emplace_back(orderOf(nodesFor(kind, nodes[n]), n).get(), kind);
+  std::sort(wanted.begin(), wanted.end());
+  wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+  parallelBlocks(wanted.size(), 1, options_.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) wanted[n].first->prepare(wanted[n].second);
+  });
 }
 
 FastSources::Offsets FastSources::offsetsOf(const Octree& tree) const {
   Offsets out{0};
-  for (const OctreeNode& node : tree.nodes()) out.push_back(out.back() + levelOf(node).first.back());
+  for (const OctreeNode& node : tree.nodes()) out.push_back(out.back() + levelOf(node).length);
   return out;
 }
 
@@ -110,8 +115,7 @@ FastSources::Values FastSources::gatherUp(std::span<const double> weights) const
         const OctreeNode& from = tree.nodes()[child];
         levelOf(from).octants->toCoarse(octantOf(from), up.data() + first_[child], own);
       }
-      for (std::size_t part = 0; part < level.narrower.size(); ++part)
-        level.narrower[part].toCoarse(0, own + level.first[part], own + level.first[part + 1]);
+      chebyshevOf(node).weighTerms(own, own + level.terms);
     });
   }
   return up;

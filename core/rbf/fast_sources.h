@@ -32,14 +32,17 @@ class FastSources {
  public:
   static constexpr int kFirstFar = 2;  ///< no cube is far from another above this level
 
-  /// What the cubes of one level are told by: a part with `nodes` for the nearest kinds of pairs, and smaller ones for
-  /// those farther apart.
+  /// What the cubes of one level are told by: their nodes, and behind them the terms of those. Kinds of pairs that are
+  /// farther apart use fewer terms.
   struct Level {
     int nodes = 0;
-    std::vector<std::shared_ptr<const FarOrder>> orders;  ///< of each part
-    std::vector<std::size_t> first;                       ///< where each part's values begin, and their whole length
-    std::vector<Transfer> narrower;                       ///< from each part to the next
-    std::unique_ptr<const Transfer> octants;              ///< from the first part to the parents'
+    std::vector<std::shared_ptr<const FarOrder>> orders;  ///< for `nodes`, and for each fewer that some kind needs
+    std::size_t terms = 0, length = 0;                    ///< where terms begin, and the whole length
+    std::unique_ptr<const Transfer> octants;              ///< to the parents' nodes
+
+    [[nodiscard]] const FarOrder& orderOf(int kind) const {
+      return *orders[static_cast<std::size_t>(nodes - nodesFor(kind, nodes))];
+    }
   };
   using Values = std::vector<double>;
   using Offsets = std::vector<std::size_t>;  ///< where each node's values begin

@@ -85,9 +85,8 @@ FastSum::FastSum(const std::shared_ptr<const FastSources>& sources, std::span<co
 
 void FastSum::meet(std::shared_ptr<const FastSources> sources, std::shared_ptr<const Octree> targets) {
   sources_ = std::move(sources), targets_ = std::move(targets);
-  const auto last = static_cast<std::size_t>(sources_->levels().back().nodes);
-  const std::size_t few = last * last * last;
-  seen_ = interactionsOf(*targets_, sources_->tree(), few, few * few / kPairOfNodes);
+  const FarOrder& last = *sources_->levels().back().orders[0];
+  seen_ = interactionsOf(*targets_, sources_->tree(), last.chebyshev().values(), last.products() / kPairOfNodes);
   down_first_ = sources_->offsetsOf(*targets_);
 }
 
@@ -97,34 +96,33 @@ void FastSum::farColumns(std::size_t from, std::size_t columns, const Values& up
   const OctreeNode& first = targets_->nodes()[seen_.far[from].target];
   const FastSources::Level& level = sources_->levelOf(first);
   const int kind = seen_.far[from].kind.kind;
-  const auto part = static_cast<std::size_t>(level.nodes - nodesFor(kind, level.nodes));
-  const FarOrder& order = *level.orders[part];
-  const std::size_t stored = order.chebyshev().stored(), count = order.chebyshev().values();
-  const double scale = sources_->tree().halfOf(first.level);
-  const std::vector<double>& along = order.along(kind);
+  const FarOrder& order = level.orderOf(kind);
+  const std::size_t stored = order.stored(), count = order.terms();
+  const double scale = sources_->tree().halfOf(first.level), distance = FarOrder::distance(kind);
+  const std::array<double, 3> direction = FarOrder::direction(kind);
   x.resize(count * kColumns), y.resize(stored * kColumns);
-  std::array<double, kColumns> sum, reach;  // of the weights, and of weights times how far their nodes are
+  std::array<std::array<double, 4>, kColumns> seen;  // what is not in the matrices
   for (std::size_t c = 0; c < columns; ++c) {
     const Interactions::FarPair& pair = seen_.far[from + c];
-    const double* const source = up.data() + sources_->first()[pair.source] + level.first[part];
-    const std::vector<std::uint16_t>& turned = order.turned(pair.kind.turn);
+    const double* const source = up.data() + sources_->first()[pair.source] + level.terms;
+    const FarOrder::Turn& turn = order.turned(pair.kind.turn);
     T* const to = x.data() + c * count;
-    double weights = 0, moment = 0;
-    for (std::size_t n = 0; n < count; ++n) {
-      const double w = scale * source[n];
-      to[turned[n]] = static_cast<T>(w);
-      weights += w, moment += w * along[turned[n]];
+    for (std::size_t n = 0; n < count; ++n) to[turn.term[n]] = static_cast<T>(scale * turn.sign[n] * source[n]);
+    const double sum = scale * source[0];
+    seen[c][0] = distance * sum;
+    for (std::size_t n = 1; n < 4; ++n) {
+      const double along = turn.sign[n] * direction[turn.term[n] - 1U];
+      seen[c][0] += scale * source[n] * along, seen[c][n] = -sum * along;
     }
-    sum[c] = weights, reach[c] = moment + weights * order.distance(kind);
   }
   order.see(kind, x.data(), columns, y.data());
   for (std::size_t c = 0; c < columns; ++c) {
     const Interactions::FarPair& pair = seen_.far[from + c];
-    double* const target = down.data() + down_first_[pair.target] + level.first[part];
-    const std::vector<std::uint16_t>& turned = order.turned(pair.kind.turn);
+    double* const target = down.data() + down_first_[pair.target] + level.terms;
+    const FarOrder::Turn& turn = order.turned(pair.kind.turn);
     const T* const result = y.data() + c * stored;
-    for (std::size_t n = 0; n < count; ++n)
-      target[n] += static_cast<double>(result[turned[n]]) + (reach[c] - sum[c] * along[turned[n]]);
+    for (std::size_t n = 0; n < count; ++n) target[n] += turn.sign[n] * static_cast<double>(result[turn.term[n]]);
+    for (std::size_t n = 0; n < 4; ++n) target[n] += seen[c][n];
   }
 }
 
@@ -139,8 +137,7 @@ void FastSum::farGroup(std::size_t group, const Values& up, Values& down) const 
     while (columns < kColumns && from + columns < end && seen_.far[from + columns].kind.kind == kind &&
            nodes[seen_.far[from + columns].target].level == level)
       ++columns;
-    const FastSources::Level& own = sources_->levels()[static_cast<std::size_t>(level)];
-    if (own.orders[static_cast<std::size_t>(own.nodes - nodesFor(kind, own.nodes))]->single()) {
+    if (sources_->levels()[static_cast<std::size_t>(level)].orderOf(kind).single()) {
       farColumns(from, columns, up, down, single_x, single_y);
     } else {
       farColumns(from, columns, up, down, x, y);
@@ -185,9 +182,8 @@ void FastSum::passDown(Values& down) const {
     const FastSources::Level& level = sources_->levels()[static_cast<std::size_t>(at)];
     eachOfLevel(tree, at, options().threads, [&](std::size_t n) {
       double* const own = down.data() + down_first_[n];
-      for (std::size_t part = level.narrower.size(); part-- > 0;)
-        level.narrower[part].toFine(0, own + level.first[part + 1], own + level.first[part]);
       const OctreeNode& node = tree.nodes()[n];
+      sources_->chebyshevOf(node).fromTerms(own + level.terms, own);
       for (std::int32_t c = 0; c < node.child_count; ++c) {
         const std::size_t child = static_cast<std::size_t>(node.children + c);
         const OctreeNode& to = tree.nodes()[child];

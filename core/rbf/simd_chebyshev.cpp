@@ -58,6 +58,35 @@ void gatherAll(const CubeBasis& cube, const PointArrays<double>& points, const d
 using W = hn::ScalableTag<double>;
 using V = hn::Vec<W>;
 
+/// out(a, ., .) = sum_b m(a, b) in(b, ., .), and the axes turned: (a, b, c) -> (b, c, a). Three times is all axes.
+/// @pre a vector's length more can be read behind `in`.
+HWY_INLINE void applyAndTurn(const double* m, std::size_t rows, std::size_t columns, std::size_t rest, const double* in,
+                             double* out) {
+  const W d;
+  HWY_ALIGN double lanes[HWY_MAX_BYTES / sizeof(double)];
+  for (std::size_t n = 0; n < rest; n += hn::Lanes(d)) {
+    V own[kMostNodes];
+    for (std::size_t b = 0; b < columns; ++b) own[b] = hn::LoadU(d, in + b * rest + n);
+    for (std::size_t a = 0; a < rows; ++a) {
+      V sum = hn::Zero(d);
+      for (std::size_t b = 0; b < columns; ++b) sum = hn::MulAdd(hn::Set(d, m[a * columns + b]), own[b], sum);
+      hn::Store(sum, d, lanes);
+      for (std::size_t k = 0; k < std::min(hn::Lanes(d), rest - n); ++k) out[(n + k) * rows + a] = lanes[k];
+    }
+  }
+  std::fill(out + rows * rest, out + rows * rest + hn::Lanes(d), 0.0);
+}
+
+void applyAll(const double* const matrices[3], std::size_t to, std::size_t from, const double* values, double* out) {
+  constexpr std::size_t kMost = 10, kRoom = kMost * kMost * kMost + HWY_MAX_BYTES / sizeof(double);
+  double a[kRoom], b[kRoom];
+  std::fill(std::copy(values, values + from * from * from, b), b + kRoom, 0.0);
+  applyAndTurn(matrices[0], to, from, from * from, b, a);
+  applyAndTurn(matrices[1], to, from, from * to, a, b);
+  applyAndTurn(matrices[2], to, from, to * to, b, a);
+  for (std::size_t n = 0; n < to * to * to; ++n) out[n] += a[n];
+}
+
 /// As many points as a vector has lanes, the last ones filled up with the last point: S_a along one axis, and its
 /// slope.
 struct AxisBasis {
@@ -158,6 +187,7 @@ namespace spinaltap::rbf {
 HWY_EXPORT(gatherAll);
 HWY_EXPORT(spreadAll);
 HWY_EXPORT(spreadSlopes);
+HWY_EXPORT(applyAll);
 
 void gatherWeights(const CubeBasis& cube, const PointArrays<double>& points, const double* weights, double* values) {
   HWY_DYNAMIC_DISPATCH(gatherAll)(cube, points, weights, values);
@@ -168,6 +198,10 @@ void spreadValues(const CubeBasis& cube, const double* values, const PointArrays
 void spreadGradients(const CubeBasis& cube, const double* values, const PointArrays<double>& points, double* x,
                      double* y, double* z) {
   HWY_DYNAMIC_DISPATCH(spreadSlopes)(cube, values, points, x, y, z);
+}
+
+void applyToAxes(const double* const matrices[3], std::size_t to, std::size_t from, const double* values, double* out) {
+  HWY_DYNAMIC_DISPATCH(applyAll)(matrices, to, from, values, out);
 }
 
 }  // namespace spinaltap::rbf

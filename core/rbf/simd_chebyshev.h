@@ -22,4 +22,8 @@ void spreadValues(const CubeBasis& cube, const double* values, const PointArrays
 void spreadGradients(const CubeBasis& cube, const double* values, const PointArrays<double>& points, double* out_x,
                      double* out_y, double* out_z);
 
+/// out += values by one matrix an axis, from `from` to `to` nodes: matrices[n] is to x from, row by row. @pre at
+/// most 10.
+void applyToAxes(const double* const matrices[3], std::size_t to, std::size_t from, const double* values, double* out);
+
 }  // namespace spinaltap::rbf

@@ -76,35 +76,40 @@ void multiplyTile(const T* a, std::size_t rows, std::size_t inner, const T* x, s
                  y + static_cast<std::size_t>(c) * y_stride + static_cast<std::size_t>(v) * hn::Lanes(d));
 }
 
-template <int kColumns, class T>
-void multiplyColumns(const T* a, std::size_t rows, std::size_t inner, const T* x, std::size_t x_stride, T* y,
-                     std::size_t y_stride) {
-  const std::size_t lanes = hn::Lanes(hn::ScalableTag<T>());
-  std::size_t row = 0;
-  for (; row + kTileVectors * lanes <= rows; row += kTileVectors * lanes)
-    multiplyTile<kTileVectors, kColumns>(a + row, rows, inner, x, x_stride, y + row, y_stride);
-  if (row + 2 * lanes <= rows) {
-    multiplyTile<2, kColumns>(a + row, rows, inner, x, x_stride, y + row, y_stride);
-    row += 2 * lanes;
-  }
-  for (; row < rows; row += lanes) multiplyTile<1, kColumns>(a + row, rows, inner, x, x_stride, y + row, y_stride);
+/// Some rows, for all columns: these rows stay in the second cache.
+template <int kVectors, class T>
+void multiplyRows(const TaperedMatrix<T>& a, std::size_t row, const T* x, std::size_t x_stride, std::size_t columns,
+                  T* y, std::size_t y_stride) {
+  const T* const own = a.values + row;
+  const std::size_t inner = a.lengths[row];
+  std::size_t c = 0;
+  for (; c + kTileColumns <= columns; c += kTileColumns)
+    multiplyTile<kVectors, kTileColumns>(own, a.rows, inner, x + c * x_stride, x_stride, y + c * y_stride + row,
+                                         y_stride);
+  for (; c < columns; ++c)
+    multiplyTile<kVectors, 1>(own, a.rows, inner, x + c * x_stride, x_stride, y + c * y_stride + row, y_stride);
 }
 
 template <class T>
-void multiplyAll(const T* a, std::size_t rows, std::size_t inner, const T* x, std::size_t x_stride, std::size_t columns,
-                 T* y, std::size_t y_stride) {
-  std::size_t c = 0;
-  for (; c + kTileColumns <= columns; c += kTileColumns)
-    multiplyColumns<kTileColumns>(a, rows, inner, x + c * x_stride, x_stride, y + c * y_stride, y_stride);
-  for (; c < columns; ++c) multiplyColumns<1>(a, rows, inner, x + c * x_stride, x_stride, y + c * y_stride, y_stride);
+void multiplyAll(const TaperedMatrix<T>& a, const T* x, std::size_t x_stride, std::size_t columns, T* y,
+                 std::size_t y_stride) {
+  const std::size_t lanes = hn::Lanes(hn::ScalableTag<T>());
+  std::size_t row = 0;
+  for (; row + kTileVectors * lanes <= a.rows; row += kTileVectors * lanes)
+    multiplyRows<kTileVectors>(a, row, x, x_stride, columns, y, y_stride);
+  if (row + 2 * lanes <= a.rows) {
+    multiplyRows<2>(a, row, x, x_stride, columns, y, y_stride);
+    row += 2 * lanes;
+  }
+  for (; row < a.rows; row += lanes) multiplyRows<1>(a, row, x, x_stride, columns, y, y_stride);
 }
-void multiplyDouble(const double* a, std::size_t rows, std::size_t inner, const double* x, std::size_t x_stride,
-                    std::size_t columns, double* y, std::size_t y_stride) {
-  multiplyAll(a, rows, inner, x, x_stride, columns, y, y_stride);
+void multiplyDouble(const TaperedMatrix<double>& a, const double* x, std::size_t x_stride, std::size_t columns,
+                    double* y, std::size_t y_stride) {
+  multiplyAll(a, x, x_stride, columns, y, y_stride);
 }
-void multiplySingle(const float* a, std::size_t rows, std::size_t inner, const float* x, std::size_t x_stride,
-                    std::size_t columns, float* y, std::size_t y_stride) {
-  multiplyAll(a, rows, inner, x, x_stride, columns, y, y_stride);
+void multiplySingle(const TaperedMatrix<float>& a, const float* x, std::size_t x_stride, std::size_t columns, float* y,
+                    std::size_t y_stride) {
+  multiplyAll(a, x, x_stride, columns, y, y_stride);
 }
 
 /// Subtracts from rows of tile (row, column) the products of the tiles left of it and of its column's diagonal tile.
@@ -354,13 +359,13 @@ constexpr std::size_t kTilesWorthThreads = 16;
 
 }  // namespace
 
-void multiply(const double* a, std::size_t rows, std::size_t inner, const double* x, std::size_t x_stride,
-              std::size_t columns, double* y, std::size_t y_stride) {
-  HWY_DYNAMIC_DISPATCH(multiplyDouble)(a, rows, inner, x, x_stride, columns, y, y_stride);
+void multiply(const TaperedMatrix<double>& a, const double* x, std::size_t x_stride, std::size_t columns, double* y,
+              std::size_t y_stride) {
+  HWY_DYNAMIC_DISPATCH(multiplyDouble)(a, x, x_stride, columns, y, y_stride);
 }
-void multiply(const float* a, std::size_t rows, std::size_t inner, const float* x, std::size_t x_stride,
-              std::size_t columns, float* y, std::size_t y_stride) {
-  HWY_DYNAMIC_DISPATCH(multiplySingle)(a, rows, inner, x, x_stride, columns, y, y_stride);
+void multiply(const TaperedMatrix<float>& a, const float* x, std::size_t x_stride, std::size_t columns, float* y,
+              std::size_t y_stride) {
+  HWY_DYNAMIC_DISPATCH(multiplySingle)(a, x, x_stride, columns, y, y_stride);
 }
 
 template <class T>

@@ -1,18 +1,27 @@
 // core/rbf/simd_dense.h - dense products and Cholesky factors, for whichever vector width the machine has (internal).
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "core/rbf/simd_sums.h"
 
 namespace spinaltap::rbf {
 
-/// y(:, c) = A x(:, c): A is rows x inner, x inner x columns, y rows x columns, all column-major with these strides.
-/// @pre rows is a multiple of 16. A column's bits do not depend on the other columns.
-void multiply(const double* a, std::size_t rows, std::size_t inner, const double* x, std::size_t x_stride,
-              std::size_t columns, double* y, std::size_t y_stride);
-void multiply(const float* a, std::size_t rows, std::size_t inner, const float* x, std::size_t x_stride,
-              std::size_t columns, float* y, std::size_t y_stride);
+/// Column-major, `rows` long each; row r is zero from column lengths[r] on, and lengths do not increase.
+/// @pre rows is a multiple of 16.
+template <class T>
+struct TaperedMatrix {
+  const T* values;
+  std::size_t rows;
+  const std::uint32_t* lengths;
+};
+
+/// y(:, c) = A x(:, c), all column-major with these strides. A column's bits do not depend on the other columns.
+void multiply(const TaperedMatrix<double>& a, const double* x, std::size_t x_stride, std::size_t columns, double* y,
+              std::size_t y_stride);
+void multiply(const TaperedMatrix<float>& a, const float* x, std::size_t x_stride, std::size_t columns, float* y,
+              std::size_t y_stride);
 
 /// L with L L^T = A for a symmetric positive definite matrix, in square tiles of 48: only those on and below the
 /// diagonal are stored, each in one piece, so that a product of two tiles runs through memory in order. Left-looking: a

@@ -13,23 +13,29 @@ struct OnePoint {
   [[nodiscard]] PointArrays<double> array() const { return {&x, &y, &z, 1}; }
 };
 
-/// The distance from y to x, told by the nodes of cubes of half side 1: y in the cube at 0, x in the one `offset` cubes
+/// The distance from y to x, told by the terms of cubes of half side 1: y in the cube at 0, x in the one `offset` cubes
 /// before it.
 template <class T>
 double told(const FarOrder& order, const FarKind& kind, const Vec3& x, const Vec3& y) {
   const Chebyshev& c = order.chebyshev();
   const double middle[3] = {0, 0, 0}, one = 1;
-  std::vector<double> at(c.values(), 0.0), back(c.stored(), 0.0);
+  std::vector<double> at(c.values(), 0.0), terms(order.terms(), 0.0), back = terms, values(c.values(), 0.0);
   c.gather(OnePoint(y).array(), &one, middle, 1, at.data());
-  std::vector<T> turned(c.values()), seen(c.stored());
-  const std::vector<std::uint16_t>& turn = order.turned(kind.turn);
-  const std::vector<double>& along = order.along(kind.kind);
-  double reach = order.distance(kind.kind);  // the weights at the nodes have the sum 1
-  for (std::size_t n = 0; n < at.size(); ++n) turned[turn[n]] = static_cast<T>(at[n]), reach += at[n] * along[turn[n]];
+  c.weighTerms(at.data(), terms.data());
+  std::vector<T> turned(order.terms()), seen(order.stored());
+  const FarOrder::Turn& turn = order.turned(kind.turn);
+  for (std::size_t n = 0; n < terms.size(); ++n) turned[turn.term[n]] = static_cast<T>(turn.sign[n] * terms[n]);
   order.see(kind.kind, turned.data(), 1, seen.data());
-  for (std::size_t n = 0; n < at.size(); ++n) back[n] = static_cast<double>(seen[turn[n]]) + reach - along[turn[n]];
+  for (std::size_t n = 0; n < terms.size(); ++n) back[n] = turn.sign[n] * static_cast<double>(seen[turn.term[n]]);
+  const std::array<double, 3> direction = FarOrder::direction(kind.kind);
+  back[0] += FarOrder::distance(kind.kind);  // the weights have the sum 1
+  for (std::size_t n = 1; n < 4; ++n) {
+    const double along = turn.sign[n] * direction[turn.term[n] - 1U];
+    back[0] += along * terms[n], back[n] -= along;
+  }
+  c.fromTerms(back.data(), values.data());
   double out = 0;
-  c.spread(back.data(), middle, 1, OnePoint(x).array(), &out);
+  c.spread(values.data(), middle, 1, OnePoint(x).array(), &out);
   return out;
 }
 

@@ -205,9 +205,13 @@ void expectPlainProduct(double rounding) {
   for (const std::size_t columns : {1UL, 3UL, 8UL, 21UL}) {
     const std::size_t rows = 80, inner = 27;
     std::vector<T> a(rows * inner), x(inner * columns), y(rows * columns);
-    for (T& v : a) v = static_cast<T>(random.uniform(-1, 1));
+    std::vector<std::uint32_t> lengths(rows);
+    for (std::size_t r = 0; r < rows; ++r) {
+      lengths[r] = static_cast<std::uint32_t>(inner - r / 3);
+      for (std::size_t k = 0; k < lengths[r]; ++k) a[k * rows + r] = static_cast<T>(random.uniform(-1, 1));
+    }
     for (T& v : x) v = static_cast<T>(random.uniform(-1, 1));
-    multiply(a.data(), rows, inner, x.data(), inner, columns, y.data(), rows);
+    multiply({a.data(), rows, lengths.data()}, x.data(), inner, columns, y.data(), rows);
     for (std::size_t c = 0; c < columns; ++c)
       for (std::size_t r = 0; r < rows; ++r) {
         double sum = 0;
