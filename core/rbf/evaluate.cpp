@@ -13,6 +13,7 @@ namespace spinaltap::rbf {
 namespace {
 
 constexpr std::size_t kBlock = 64;                   // points that one thread takes at a time
+constexpr std::size_t kPass = 20'000;                // and of those that cost little each
 constexpr std::size_t kWorthAThread = 200'000;       // pairs
 constexpr std::size_t kWorthFastSums = 4'000'000;    // pairs: below, planning costs more than it saves
 constexpr double kPreparedRadii = 1.25;              // points nearer have sums prepared for them
@@ -62,20 +63,28 @@ struct Regions {
   std::vector<std::size_t> near, around, far;  ///< within the prepared cube, within fast sums' reach, and beyond
 };
 
-Regions regionsOf(const Model& m, const RootCube& prepared, std::span<const Vec3> points) {
+Regions regionsOf(const Model& m, const RootCube& prepared, std::span<const Vec3> points, unsigned threads) {
   const double reach = kFarRadii * std::max(m.radius_mm, std::numeric_limits<double>::min());
+  std::vector<std::uint8_t> region(points.size());
+  parallelBlocks(points.size(), kPass, threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3 p = points[i] - m.centroid_patient;
+      region[i] = prepared.holds(p) ? 0 : norm(p) <= reach ? 1 : 2;
+    }
+  });
   Regions out;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p = points[i] - m.centroid_patient;
-    (prepared.holds(p) ? out.near : norm(p) <= reach ? out.around : out.far).push_back(i);
-  }
+  out.near.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    (region[i] == 0 ? out.near : region[i] == 1 ? out.around : out.far).push_back(i);
   return out;
 }
 
-std::vector<Vec3> relative(const Model& m, std::span<const Vec3> points, const std::vector<std::size_t>& chosen) {
-  std::vector<Vec3> out;
-  out.reserve(chosen.size());
-  for (const std::size_t i : chosen) out.push_back(points[i] - m.centroid_patient);
+std::vector<Vec3> relative(const Model& m, std::span<const Vec3> points, const std::vector<std::size_t>& chosen,
+                           unsigned threads) {
+  std::vector<Vec3> out(chosen.size());
+  parallelBlocks(chosen.size(), kPass, threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) out[n] = points[chosen[n]] - m.centroid_patient;
+  });
   return out;
 }
 
@@ -185,15 +194,15 @@ Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads)
 /// direct(chosen points) for the others.
 template <class Use, class Direct>
 void Evaluator::split(std::span<const Vec3> points, const Use& use, const Direct& direct) const {
-  const Regions regions = regionsOf(model_, prepared_->sources.tree().root(), points);
+  const Regions regions = regionsOf(model_, prepared_->sources.tree().root(), points, threads_);
   if (!regions.near.empty()) {
-    const std::vector<Vec3> at = relative(model_, points, regions.near);
+    const std::vector<Vec3> at = relative(model_, points, regions.near, threads_);
     use(regions.near, at,
         FastSum({prepared_, &prepared_->sources}, at, optionsOf(model_, tolerance_, error_, threads_, at.size())),
         prepared_->weighted);
   }
   if (!regions.around.empty()) {
-    const std::vector<Vec3> at = relative(model_, points, regions.around);
+    const std::vector<Vec3> at = relative(model_, points, regions.around, threads_);
     const FastSumOptions options = optionsOf(model_, tolerance_, error_, threads_, at.size());
     const auto sources =
         std::make_shared<const FastSources>(model_.centres, RootCube::around(model_.centres, at), options);
@@ -210,7 +219,9 @@ void Evaluator::values(std::span<const Vec3> points, std::span<double> out) cons
       [&](const auto& chosen, const auto& at, const FastSum& sum, const FastSources::Weighted& weighted) {
         std::vector<double> sums(at.size());
         sum.values(weighted, sums);
-        for (std::size_t n = 0; n < at.size(); ++n) out[chosen[n]] = finished(model_, at[n], sums[n]);
+        parallelBlocks(at.size(), kPass, threads_, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t n = begin; n < end; ++n) out[chosen[n]] = finished(model_, at[n], sums[n]);
+        });
       },
       [&](const auto& chosen) {
         std::vector<double> s(chosen.size());
@@ -227,7 +238,9 @@ void Evaluator::gradients(std::span<const Vec3> points, std::span<Vec3> out) con
       [&](const auto& chosen, const auto& at, const FastSum& sum, const FastSources::Weighted& weighted) {
         std::vector<Vec3> slopes(at.size());
         sum.gradients(weighted, slopes);
-        for (std::size_t n = 0; n < at.size(); ++n) out[chosen[n]] = slopes[n] + model_.linear;
+        parallelBlocks(at.size(), kPass, threads_, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t n = begin; n < end; ++n) out[chosen[n]] = slopes[n] + model_.linear;
+        });
         pointAwayBeyond(at, chosen, points, out);
       },
       [&](const auto& chosen) {

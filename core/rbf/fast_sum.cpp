@@ -234,50 +234,47 @@ void FastSum::eachLeaf(const FastSources::Weighted& weighted, const Use& use) co
 void FastSum::values(const FastSources::Weighted& weighted, std::span<double> out) const {
   Values down = passAcross(weighted);
   passDown(down);
-  std::vector<double> sums(targets_->size(), 0.0);
   eachLeaf(weighted, [&](std::size_t n, const Vec3& m, const Gathered<double>& wide, const Gathered<float>& narrow) {
     const OctreeNode& node = targets_->nodes()[n];
     const PointArrays<double> points = targets_->points(node);
-    double* const to = sums.data() + node.first;
+    std::vector<double> sums(node.count, 0.0);
     const double middle[3] = {m.x, m.y, m.z};
     if (node.level >= FastSources::kFirstFar)
       sources_->chebyshevOf(node).spread(down.data() + down_first_[n], middle, targets_->halfOf(node.level), points,
-                                         to);
+                                         sums.data());
     Gathered<double> own;
     own.add(points, nullptr, m);
-    if (!wide.x.empty()) addDistances(own.points(), wide.points(), wide.w.data(), to);
+    if (!wide.x.empty()) addDistances(own.points(), wide.points(), wide.w.data(), sums.data());
     if (!narrow.x.empty()) {
       Gathered<float> single;
       single.add(points, nullptr, m);
-      addDistances(single.points(), narrow.points(), narrow.w.data(), to);
+      addDistances(single.points(), narrow.points(), narrow.w.data(), sums.data());
     }
+    for (std::size_t i = 0; i < node.count; ++i) out[targets_->order()[node.first + i]] = sums[i];
   });
-  for (std::size_t n = 0; n < sums.size(); ++n) out[targets_->order()[n]] = sums[n];
 }
 
 void FastSum::gradients(const FastSources::Weighted& weighted, std::span<Vec3> out) const {
   Values down = passAcross(weighted);
   passDown(down);
-  std::vector<double> x(targets_->size(), 0.0), y = x, z = x;
   eachLeaf(weighted, [&](std::size_t n, const Vec3& m, const Gathered<double>& wide, const Gathered<float>& narrow) {
     const OctreeNode& node = targets_->nodes()[n];
     const PointArrays<double> points = targets_->points(node);
-    const std::size_t at = node.first;
+    std::vector<double> x(node.count, 0.0), y = x, z = x;
     const double middle[3] = {m.x, m.y, m.z};
     if (node.level >= FastSources::kFirstFar)
       sources_->chebyshevOf(node).spreadGradient(down.data() + down_first_[n], middle, targets_->halfOf(node.level),
-                                                 points, x.data() + at, y.data() + at, z.data() + at);
+                                                 points, x.data(), y.data(), z.data());
     Gathered<double> own;
     own.add(points, nullptr, m);
-    if (!wide.x.empty())
-      addDirections(own.points(), wide.points(), wide.w.data(), x.data() + at, y.data() + at, z.data() + at);
+    if (!wide.x.empty()) addDirections(own.points(), wide.points(), wide.w.data(), x.data(), y.data(), z.data());
     if (!narrow.x.empty()) {
       Gathered<float> single;
       single.add(points, nullptr, m);
-      addDirections(single.points(), narrow.points(), narrow.w.data(), x.data() + at, y.data() + at, z.data() + at);
+      addDirections(single.points(), narrow.points(), narrow.w.data(), x.data(), y.data(), z.data());
     }
+    for (std::size_t i = 0; i < node.count; ++i) out[targets_->order()[node.first + i]] = {x[i], y[i], z[i]};
   });
-  for (std::size_t n = 0; n < x.size(); ++n) out[targets_->order()[n]] = {x[n], y[n], z[n]};
 }
 
 }  // namespace spinaltap::rbf

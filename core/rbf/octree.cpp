@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/base/box.h"
 #include "core/base/parallel.h"
@@ -31,16 +32,34 @@ struct Keyed {
   std::uint32_t index;
 };
 
-/// Stable, 11 bits a pass, over the highest `bits` of 60.
-void sortByHighBits(std::vector<Keyed>& items, int bits) {
-  constexpr int kDigit = 11;
+/// Stable, by one digit. Each block of items finds its own places, so that all can be moved at once.
+void sortByDigit(std::vector<Keyed>& items, std::vector<Keyed>& other, int shift, int bits, unsigned threads) {
+  const std::size_t digits = std::size_t{1} << bits, blocks = (items.size() + kBlock - 1) / kBlock;
+  const auto digitOf = [&](const Keyed& i) { return static_cast<std::size_t>(i.key >> shift & (digits - 1)); };
+  std::vector<std::uint32_t> places(blocks * digits, 0);
+  parallelBlocks(items.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {
+    std::uint32_t* const own = places.data() + begin / kBlock * digits;
+    for (std::size_t n = begin; n < end; ++n) ++own[digitOf(items[n])];
+  });
+  std::uint32_t next = 0;
+  for (std::size_t digit = 0; digit < digits; ++digit)
+    for (std::size_t block = 0; block < blocks; ++block) next += std::exchange(places[block * digits + digit], next);
+  parallelBlocks(items.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {
+    std::uint32_t* const own = places.data() + begin / kBlock * digits;
+    for (std::size_t n = begin; n < end; ++n) other[own[digitOf(items[n])]++] = items[n];
+  });
+  items.swap(other);
+}
+
+/// Stable, over the highest `bits` of 60, in as few passes as there can be of at most 12 bits.
+void sortByHighBits(std::vector<Keyed>& items, int bits, unsigned threads) {
+  constexpr int kMost = 12;
+  const int passes = (bits + kMost - 1) / kMost;
   std::vector<Keyed> other(items.size());
-  for (int shift = 3 * Octree::kDeepest - bits; shift < 3 * Octree::kDeepest; shift += kDigit) {
-    std::array<std::uint32_t, (1U << kDigit) + 1> starts{};
-    for (const Keyed& i : items) ++starts[(i.key >> shift & ((1U << kDigit) - 1)) + 1];
-    for (std::size_t n = 1; n < starts.size(); ++n) starts[n] += starts[n - 1];
-    for (const Keyed& i : items) other[starts[i.key >> shift & ((1U << kDigit) - 1)]++] = i;
-    items.swap(other);
+  for (int pass = 0, shift = 3 * Octree::kDeepest - bits; pass < passes; ++pass) {
+    const int digit = (bits + pass) / passes;  // shares of `bits` that differ by one at most
+    sortByDigit(items, other, shift, digit, threads);
+    shift += digit;
   }
 }
 
@@ -71,7 +90,7 @@ Octree::Octree(std::span<const Vec3> points, const RootCube& root, std::size_t l
       items[i] = {spread(x) | spread(y) << 1 | spread(z) << 2, static_cast<std::uint32_t>(i)};
     }
   });
-  sortByHighBits(items, 3 * std::min(deepest, kDeepest));
+  sortByHighBits(items, 3 * std::min(deepest, kDeepest), threads);
   std::vector<std::uint64_t> keys(items.size());
   order_.resize(items.size()), x_.resize(items.size()), y_.resize(items.size()), z_.resize(items.size());
   parallelBlocks(items.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {
