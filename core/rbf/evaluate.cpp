@@ -177,15 +177,17 @@ Evaluator::Evaluator(Model model, double tolerance_mm, unsigned threads)
   const Coordinates at(places), centres(model_.centres);
   std::vector<double> direct(places.size()), fast(places.size());
   directSums(model_, centres, at, direct, threads_);
+  FarOrders orders;  // finer sums share most of them
   for (double error = 0.1 * tolerance_mm; error > 1e-4 * tolerance_mm; error *= 0.3) {
     FastSumOptions options = optionsOf(model_, tolerance_, error, threads_, 0);
     options.target_leaf_size = 2;  // cubes as small as those of many points
+    options.orders = &orders;
     FastSum(model_.centres, places, options).values(model_.weights, fast);
     double most = 0;
     for (std::size_t k = 0; k < places.size(); ++k) most = std::max(most, std::abs(fast[k] - direct[k]));
     if (!(most <= kAtTrials * tolerance_mm)) continue;
     error_ = error;
-    prepared_ = std::make_shared<const Prepared>(model_, optionsOf(model_, tolerance_, error_, threads_, 0));
+    prepared_ = std::make_shared<const Prepared>(model_, options);
     return;
   }
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/rbf/chebyshev.h"
@@ -71,6 +72,19 @@ class FarOrder {
   std::array<Turn, FarKind::kTurns> turns_;
   std::array<std::vector<double>, FarKind::kCount> double_;
   std::array<std::vector<float>, FarKind::kCount> single_;
+};
+
+/// Orders that sums made one after the other can share. Not for two threads at once.
+class FarOrders {
+ public:
+  [[nodiscard]] const std::shared_ptr<FarOrder>& get(int nodes, bool single) {
+    std::shared_ptr<FarOrder>& order = made_[single ? 1 : 0][static_cast<std::size_t>(nodes)];
+    if (order == nullptr) order = std::make_shared<FarOrder>(nodes, single);
+    return order;
+  }
+
+ private:
+  std::array<std::shared_ptr<FarOrder>, Chebyshev::kMost + 1> made_[2];
 };
 
 }  // namespace spinaltap::rbf

@@ -13,7 +13,7 @@ constexpr int kFewestByRule = 4;  // nodes an axis of the smallest cubes, unless
 FastSources::FastSources(std::span<const Vec3> sources, const RootCube& root, const FastSumOptions& options)
     : options_(options), tree_(sources, root, options.leaf_size) {
   makeLevels(chooseOrders());
-  options_.weights = {};
+  options_.weights = {}, options_.orders = nullptr;
   first_ = offsetsOf(tree_);
 }
 
@@ -58,11 +58,10 @@ FastSources::Orders FastSources::chooseOrders() const {
 
 void FastSources::makeLevels(const Orders& chosen) {
   const std::vector<int>& nodes = chosen.nodes;
-  std::array<std::shared_ptr<FarOrder>, Chebyshev::kMost + 1> orders[2];
+  FarOrders own;
+  FarOrders& orders = options_.orders != nullptr ? *options_.orders : own;
   const auto orderOf = [&](int count, std::size_t level) -> const std::shared_ptr<FarOrder>& {
-    std::shared_ptr<FarOrder>& order = orders[chosen.single[level] ? 1 : 0][static_cast<std::size_t>(count)];
-    if (order == nullptr) order = std::make_shared<FarOrder>(count, chosen.single[level]);
-    return order;
+    return orders.get(count, chosen.single[level]);
   };
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     Level& level = levels_.emplace_back();

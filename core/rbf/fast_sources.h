@@ -25,6 +25,8 @@ struct FastSumOptions {
   std::size_t leaf_size = 120;         ///< a source cube is split while it holds more
   std::size_t target_leaf_size = 120;  ///< and a target cube
   unsigned threads = 0;
+  FarOrders* orders =
+      nullptr;  ///< where to find those that another sum made, and leave new ones; used while it is made
 };
 
 /// A tree of sources and the orders of its levels; made once, it serves any number of sets of targets.
