@@ -32,7 +32,8 @@ inline constexpr double kFarSingleError = 4e-8;
 /// How the terms of one cube's weights become those of another's values, for each kind that was asked for. A distance
 /// is the cubes' own, plus how far the points are along the line between them, plus a small rest: only the rest, a
 /// tenth as large, is in the matrices, so that single precision carries further. Of the rest's p^6 coefficients, those
-/// outside a ball of six dimensions are less than its interpolant's own error: a sixth and less of them counts.
+/// outside a ball of six dimensions are less than its interpolant's own error: two fifths of them count for p = 5, a
+/// quarter for 8.
 class FarOrder {
  public:
   /// @param single whether the matrices are kept, and multiplied, in single precision.
