@@ -16,6 +16,11 @@ struct Field {
   std::function<void(std::span<const Vec3>, std::span<Vec3>)> gradients;
   /// |s(a) - s(b)| <= lipschitz * |a - b| in the region of interest; +infinity when nothing is known.
   double lipschitz = 0;
+  /// How far `values` may be from s, as sums that are made fast are; who asks on which side of the surface a point lies
+  /// asks `exact` where they are no farther from 0 than this.
+  double error_mm = 0;
+  /// s itself, one value for a point whatever is asked along with it. Empty: `values` are s. Safe as `values` is.
+  std::function<void(std::span<const Vec3>, std::span<double>)> exact;
 };
 
 }  // namespace spinaltap

@@ -5,13 +5,15 @@
 #include <limits>
 
 #include "core/base/dmath.h"
+#include "core/base/parallel.h"
 #include "core/point_volume/point_volume.h"
 
 namespace spinaltap::point_volume {
 namespace {
 
 constexpr std::uint32_t kFewPoints = 24;  // below this, halving costs about what it saves
-constexpr std::size_t kBatch = 65'536;    // points in one call of the field or the sampler
+constexpr std::size_t kBatch = 65'536;    // points in one call of the field
+constexpr std::uint32_t kSamples = 8192;  // indices that one thread samples at a time: whole words of alive bits
 constexpr std::int64_t kTurn = 1 << 24;   // angles as integers, so that every slot falls in one block
 constexpr double kSlack_mm = 1e-6;        // rounding in block centres, and in the field itself
 
@@ -28,8 +30,8 @@ int firstSlotFrom(std::int64_t turn, int ring) {
 
 class Builder {
  public:
-  Builder(const Lattice& lattice, const Frame& frame, const Field& field, const HuSampler& hu)
-      : frame_(frame), field_(field), hu_(hu), table_(discTable(lattice)) {
+  Builder(const Lattice& lattice, const Frame& frame, const Field& field, const HuSampler& hu, unsigned threads)
+      : frame_(frame), field_(field), hu_(hu), threads_(threads), table_(discTable(lattice)) {
     volume_.lattice = lattice;
     volume_.alive.assign(static_cast<std::size_t>((lattice.points() + 63) / 64), 0);
     volume_.density_mg_cm3.assign(static_cast<std::size_t>(lattice.points()), 0);
@@ -110,7 +112,7 @@ class Builder {
     std::vector<double> values(centres.size(), std::numeric_limits<double>::quiet_NaN());
     field_.values(centres, values);
     for (std::size_t i = 0; i < blocks.size(); ++i) {
-      const double reach = field_.lipschitz * (balls[i].radius_mm + kSlack_mm) + kSlack_mm;
+      const double reach = field_.lipschitz * (balls[i].radius_mm + kSlack_mm) + kSlack_mm + field_.error_mm;
       if (values[i] > reach) continue;  // no bone
       if (values[i] < -reach) {
         fillAlive(blocks[i]);
@@ -137,10 +139,24 @@ class Builder {
 
   void setAlive(std::uint32_t index) { volume_.alive[index >> 6] |= std::uint64_t{1} << (index & 63); }
 
+  /// @pre first < end.
+  void setAlive(std::uint32_t first, std::uint32_t end) {
+    const std::uint32_t last = end - 1;
+    const std::uint64_t from = ~std::uint64_t{0} << (first & 63), to = ~std::uint64_t{0} >> (63 - (last & 63));
+    if (first >> 6 == last >> 6) {
+      volume_.alive[first >> 6] |= from & to;
+      return;
+    }
+    volume_.alive[first >> 6] |= from;
+    for (std::uint32_t word = (first >> 6) + 1; word < last >> 6; ++word) volume_.alive[word] = ~std::uint64_t{0};
+    volume_.alive[last >> 6] |= to;
+  }
+
   void fillAlive(const Block& block) {
     const std::uint32_t per_disc = volume_.lattice.pointsPerDisc();
     forRuns(block, [&](int disc, std::uint32_t first, std::uint32_t end) {
-      for (std::uint32_t i = first; i < end; ++i) setAlive(static_cast<std::uint32_t>(disc) * per_disc + i);
+      const std::uint32_t start = static_cast<std::uint32_t>(disc) * per_disc;
+      setAlive(start + first, start + end);
     });
   }
 
@@ -170,31 +186,47 @@ class Builder {
     if (pending_.empty()) return;
     locatePending();
     field_.values(points_, values_);
+    if (field_.exact) makeExact();
     for (std::size_t i = 0; i < pending_.size(); ++i) {
       if (values_[i] < 0) setAlive(pending_[i]);
     }
     pending_.clear();
   }
 
-  void sampleDensity() {
-    const auto points = static_cast<std::uint32_t>(volume_.lattice.points());
-    for (std::uint32_t index = 0; index < points; ++index) {
-      if (volume_.isAlive(index)) pending_.push_back(index);
-      if (pending_.size() == kBatch || index + 1 == points) sampleBatch();
+  /// Values whose sign the field's error could turn are asked again.
+  void makeExact() {
+    std::vector<std::size_t> unsure;
+    std::vector<Vec3> at;
+    for (std::size_t i = 0; i < values_.size(); ++i) {
+      if (!(std::abs(values_[i]) > field_.error_mm)) unsure.push_back(i), at.push_back(points_[i]);
     }
+    if (at.empty()) return;
+    std::vector<double> exact(at.size(), std::numeric_limits<double>::quiet_NaN());
+    field_.exact(at, exact);
+    for (std::size_t n = 0; n < unsure.size(); ++n) values_[unsure[n]] = exact[n];
   }
 
-  void sampleBatch() {
-    if (pending_.empty()) return;
-    locatePending();
-    hu_(points_, values_);
-    for (std::size_t i = 0; i < pending_.size(); ++i) volume_.density_mg_cm3[pending_[i]] = densityFromHu(values_[i]);
-    pending_.clear();
+  void sampleDensity() {
+    static_assert(kSamples % 64 == 0);
+    parallelBlocks(volume_.density_mg_cm3.size(), kSamples, threads_, [&](std::size_t begin, std::size_t end) {
+      std::vector<std::uint32_t> alive;
+      for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
+        if (volume_.isAlive(i)) alive.push_back(i);
+      }
+      if (alive.empty()) return;
+      std::vector<Vec3> points;
+      points.reserve(alive.size());
+      for (const std::uint32_t index : alive) points.push_back(positionOf(index));
+      std::vector<double> hu(alive.size(), std::numeric_limits<double>::quiet_NaN());
+      hu_(points, hu);
+      for (std::size_t n = 0; n < alive.size(); ++n) volume_.density_mg_cm3[alive[n]] = densityFromHu(hu[n]);
+    });
   }
 
   const Frame& frame_;
   const Field& field_;
   const HuSampler& hu_;
+  unsigned threads_;
   DiscTable table_;
   PointVolume volume_;
   std::vector<std::uint32_t> pending_;
@@ -205,9 +237,9 @@ class Builder {
 }  // namespace
 
 Result<PointVolume> buildVolume(const Lattice& lattice, const Frame& path_frame, const Field& field,
-                                const HuSampler& hu) {
+                                const HuSampler& hu, unsigned threads) {
   if (auto ok = checkLattice(lattice); !ok) return tl::unexpected(ok.error());
-  return Builder(lattice, path_frame, field, hu).build();
+  return Builder(lattice, path_frame, field, hu, threads).build();
 }
 
 }  // namespace spinaltap::point_volume

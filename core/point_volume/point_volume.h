@@ -28,14 +28,18 @@ struct PointVolume {
 /// @error as checkLattice.
 [[nodiscard]] Result<PointVolume> solidVolume(const Lattice& lattice, std::uint16_t density_mg_cm3);
 
-/// hu(points_patient, out): the CT's HU at each point.
+/// hu(points_patient, out): the CT's HU at each point. Safe to call from several threads.
 using HuSampler = std::function<void(std::span<const Vec3>, std::span<double>)>;
 
 /// Points inside the bone (field < 0) are alive with the CT's density. The field is evaluated only where its
-/// Lipschitz bound cannot already decide; the result equals evaluating every point.
+/// Lipschitz bound cannot already decide, and exactly only where its error could; the result equals evaluating every
+/// point exactly, and has the same bits from any number of threads.
+/// @param threads 0: all. The field is asked from the caller's thread alone, many points at a time.
 /// @error as checkLattice.
+/// @cost  an evaluation for each point within some tenths of a millimetre of the surface, a sample of the CT for each
+///        alive point. See tests/bench/bench_volume.cpp.
 [[nodiscard]] Result<PointVolume> buildVolume(const Lattice& lattice, const Frame& path_frame, const Field& field,
-                                              const HuSampler& hu);
+                                              const HuSampler& hu, unsigned threads = 0);
 
 [[nodiscard]] std::uint64_t countAlive(const PointVolume& volume);
 

@@ -17,7 +17,8 @@ struct Cylinder {
 /// norm of the second derivative there, plus what the third can add (1.155 |w| / distance^2 a centre); centres in or
 /// near the ball count with their whole weight. Cubes where that is not good enough are split, down to half a
 /// millimetre.
-/// @cost  about as much as 10,000 gradients.
-[[nodiscard]] double lipschitzIn(const rbf::Model& model, const Cylinder& cylinder);
+/// @param threads 0: all; the same bits from any number.
+/// @cost  about as much as some thousand gradients.
+[[nodiscard]] double lipschitzIn(const rbf::Model& model, const Cylinder& cylinder, unsigned threads = 0);
 
 }  // namespace spinaltap::jobs

@@ -12,7 +12,7 @@
 namespace spinaltap::jobs {
 namespace {
 
-// Far below the finest spacing of points: only those this near to the surface may lie on its other side.
+// Far below the finest spacing of points: only those this near to the surface are summed directly.
 constexpr double kFieldTolerance_mm = 1e-4;
 
 Result<point_volume::PointVolume> buildPoints(store::Store& store, const store::Case& row, const plan::Path& path,
@@ -26,7 +26,8 @@ Result<point_volume::PointVolume> buildPoints(store::Store& store, const store::
   // a little wider than the points, so that rounding puts none outside
   const Cylinder around{frame, lattice.rings * lattice.spacing_mm, first_z_mm - lattice.spacing_mm,
                         last_z_mm + lattice.spacing_mm};
-  const Field field = rbf::asField(*model, lipschitzIn(*model, around), kFieldTolerance_mm);
+  Field field = rbf::asField(*model, lipschitzIn(*model, around), kFieldTolerance_mm);
+  field.error_mm = kFieldTolerance_mm, field.exact = rbf::asField(*model, field.lipschitz).values;
   const auto hu = [&roi](std::span<const Vec3> points, std::span<double> out) {
     for (std::size_t i = 0; i < points.size(); ++i) out[i] = volume::sampleHu(*roi, points[i]);
   };

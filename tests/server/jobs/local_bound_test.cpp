@@ -60,6 +60,7 @@ TEST(LocalBound, HoldsBetweenRandomPointsAndForRandomSlopes) {
     }
     EXPECT_LE(steepest, bound) << "seed " << seed;
     EXPECT_LT(bound, lipschitzOf(model)) << "else it is of no use";
+    for (const unsigned threads : {1U, 3U}) EXPECT_EQ(lipschitzIn(model, cylinder, threads), bound) << "seed " << seed;
   }
 }
 
