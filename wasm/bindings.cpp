@@ -25,7 +25,7 @@ Result<val> sceneResult(const std::string& name, const std::string& engine, doub
   if (!volume) return tl::unexpected(volume.error());
   const double length_mm = volume->lattice.spacing_mm * disc_count;
   Result<session::Session> session =
-      session::Session::create(std::move(*volume), {session::reportBit(), engine.empty() ? "bounded" : engine});
+      session::Session::create(std::move(*volume), {session::reportBit(), engine.empty() ? "clearance" : engine});
   if (!session) return tl::unexpected(session.error());
   const std::uint64_t count =
       cycles == 0 ? session::sceneCycles(*scene, length_mm) : std::min(wholeOf(cycles), session::kMostSceneCycles);

@@ -97,16 +97,18 @@ SessionBinding::SessionBinding(session::Session session, const Settings& setting
 StepResult SessionBinding::step(double t_us, double tx, double ty, double tz, double ax, double ay, double az,
                                 bool spinning) {
   const session::Input input{wholeOf(t_us), {tx, ty, tz}, {ax, ay, az}, spinning};
-  const session::Output output = session_.step(input);
+  removed_.clear();
+  const session::Output output = session_.step(
+      input, [&](std::span<const std::uint32_t> some) { removed_.insert(removed_.end(), some.begin(), some.end()); });
   inputs_.push_back(input);
   states_.push_back({output.cycle, output.state_hash});
   if (output.status == session::Status::Ok) {
     const plan::Bit& bit = header_.config.bit;
     if (output.removed > 0) {
-      tracker_.update(session_.volume(), output.removed_indices,
+      tracker_.update(session_.volume(), removed_,
                       {input.tip_mm, normalized(input.axis), bit.diameter_mm / 2, bit.cone_length_mm});
     }
-    metrics_.add({input.t_us, input.tip_mm, input.axis, spinning, output.thrust_N, output.removed_indices});
+    metrics_.add({input.t_us, input.tip_mm, input.axis, spinning, output.thrust_N, removed_});
   }
   return {static_cast<int>(output.status),
           static_cast<double>(output.cycle),

@@ -49,6 +49,7 @@ class SessionBinding {
   metrics::Accumulator metrics_;
   std::vector<session::Input> inputs_;
   std::vector<recording::Checkpoint> states_;  ///< after each input
+  std::vector<std::uint32_t> removed_;         ///< by the last step
   std::vector<std::uint32_t> taken_indices_;
 };
 

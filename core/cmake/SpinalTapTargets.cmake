@@ -29,14 +29,17 @@ else()
 endif()
 
 # Highway: every inner loop once for each of a few vector widths, chosen at run time; in the browser the one it has.
+# Its 1.0's WebAssembly vectors have no doubles; its portable ones do, and the compiler makes simd128 of them. Modules
+# whose vectors are all of singles take the former.
+add_library(spinaltap_simd_singles INTERFACE)
 add_library(spinaltap_simd INTERFACE)
+target_link_libraries(spinaltap_simd INTERFACE spinaltap_simd_singles)
 if(EMSCRIPTEN)
-  # Highway 1.0's WebAssembly vectors have no doubles; its portable ones do, and the compiler makes simd128 of them.
   target_compile_definitions(spinaltap_simd INTERFACE HWY_COMPILE_ONLY_EMU128)
 else()
-  target_compile_definitions(spinaltap_simd INTERFACE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_AVX3_DL)")
+  target_compile_definitions(spinaltap_simd_singles INTERFACE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_AVX3_DL)")
   find_library(HIGHWAY hwy REQUIRED)
-  target_link_libraries(spinaltap_simd INTERFACE ${HIGHWAY})
+  target_link_libraries(spinaltap_simd_singles INTERFACE ${HIGHWAY})
 endif()
 
 # spinaltap_module(core rbf DEPS base): a static library spinaltap_core_rbf of every .cpp in its own folder.

@@ -23,11 +23,13 @@ class Bounded final : public Engine {
  public:
   Bounded(const Lattice& lattice, const plan::Bit& bit) : tools_(lattice, bit) {}
 
+  using Engine::step;
   [[nodiscard]] std::string_view name() const override { return "bounded"; }
+  [[nodiscard]] std::size_t bytes() const override { return tools_.bytes(); }
 
-  Removal step(point_volume::PointVolume& volume, const BitPose& pose) override {
+  Removal step(point_volume::PointVolume& volume, const BitPose& pose, RemovedSink removed) override {
     const Lattice& lattice = volume.lattice;
-    Cutter cutter(tools_, volume, pose);
+    Cutter cutter(tools_, volume, pose, removed);
     const Span reach = reachAlongPath(tools_.shape, pose);
     const double first_disc = lattice.first_disc;
     const int first = clampedCeil(reach.low_mm / lattice.spacing_mm - first_disc, lattice.discs);
@@ -36,7 +38,7 @@ class Bounded final : public Engine {
       const Circle section = sectionCircle(tools_.shape, pose, lattice.discZ_mm(disc));
       if (section.radius_mm >= 0) cutDisc(cutter, lattice, disc, polar(section));
     }
-    return cutter.removal();
+    return cutter.finish();
   }
 
  private:

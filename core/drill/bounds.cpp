@@ -55,6 +55,21 @@ double roughArcCos(double x) {
   return x >= 0 ? acute : kPi - acute;
 }
 
+double roughTurn(double x, double y) {
+  const double a = std::abs(x), b = std::abs(y), longer = std::max(a, b);
+  if (!(longer > 0)) return 0;
+  const double t = std::min(a, b) / longer, q = t * t;
+  constexpr double kSeries[] = {0.0028662257, -0.0161657367, 0.0429096138, -0.0752896400, 0.1065626393, -0.1420889944,
+                                0.1999355085, -0.3333314528, 1.0};
+  double series = 0;
+  for (const double next : kSeries) series = series * q + next;
+  double turn = series * t * (0.5 / kPi);
+  if (b > a) turn = 0.25 - turn;
+  if (x < 0) turn = 0.5 - turn;
+  if (y < 0) turn = 1.0 - turn;
+  return turn < 1.0 ? turn : 0.0;
+}
+
 PolarCircle polar(const Circle& circle) {
   PolarCircle result;
   result.distance_mm = std::sqrt(circle.x_mm * circle.x_mm + circle.y_mm * circle.y_mm);

@@ -49,4 +49,8 @@ struct PolarCircle {
 [[nodiscard]] double roughArcCos(double x);
 inline constexpr double kAngleError_rad = 7e-5;
 
+/// The direction of (x, y) in turns, 0 <= turn < 1, to within 4e-9, by + - * / alone; 0 for the zero vector.
+/// Coefficients: Abramowitz and Stegun, 4.4.49 (error of the arctangent 2e-8).
+[[nodiscard]] double roughTurn(double x, double y);
+
 }  // namespace spinaltap::drill

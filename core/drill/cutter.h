@@ -1,99 +1,137 @@
 // core/drill/cutter.h - what every engine does to the points it has chosen: test the alive ones, remove those inside.
 // Private to core/drill.
 #pragma once
-#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <memory>
 
-#include "core/base/hash.h"
 #include "core/drill/engine.h"
 #include "core/drill/predicate.h"
 #include "core/point_volume/lattice.h"
 
 namespace spinaltap::drill {
 
-/// The parts of an engine that do not change between cycles. The index buffer is as large as the volume, so that no
-/// cycle can outgrow it.
+/// The parts of an engine that do not change between cycles.
 struct Tools {
   Tools(const point_volume::Lattice& lattice, const plan::Bit& bit)
-      : shape(shapeOf(bit)),
-        table(point_volume::discTable(lattice)),
-        indices(new std::uint32_t[static_cast<std::size_t>(lattice.points())]) {}
+      : shape(shapeOf(bit)), table(point_volume::discTable(lattice)) {}
+  [[nodiscard]] std::size_t bytes() const { return 2 * table.x_mm.size() * sizeof(double); }
 
   BitShape shape;
   point_volume::DiscTable table;
-  std::unique_ptr<std::uint32_t[]> indices;
 };
 
-/// One cycle's cutting. Ranges must come in ascending order for the indices to ascend.
+/// One cycle's cutting.
 class Cutter {
  public:
-  Cutter(const Tools& tools, point_volume::PointVolume& volume, const BitPose& pose)
-      : tools_(tools), volume_(volume), pose_(pose), per_disc_(volume.lattice.pointsPerDisc()) {}
+  Cutter(const Tools& tools, point_volume::PointVolume& volume, const BitPose& pose, RemovedSink sink)
+      : tools_(tools), volume_(volume), pose_(pose), sink_(sink), per_disc_(volume.lattice.pointsPerDisc()) {}
 
   /// Tests the alive points begin .. end-1 of one disc, counted within the disc. Dead points cost a 64th of a word.
   void cut(int disc, std::uint32_t begin, std::uint32_t end) {
-    if (begin >= end) return;
-    const std::uint32_t base = static_cast<std::uint32_t>(disc) * per_disc_;
     const double z_mm = volume_.lattice.discZ_mm(disc);
-    const std::uint32_t first = base + begin, last = base + end - 1;
-    for (std::uint32_t word = first >> 6; word <= last >> 6; ++word) {
-      std::uint64_t bits = volume_.alive[word];
-      if (word == first >> 6) bits &= ~std::uint64_t{0} << (first & 63);
-      if (word == last >> 6) bits &= ~std::uint64_t{0} >> (63 - (last & 63));
-      if (bits != 0) volume_.alive[word] &= ~cutWord(word, bits, base, z_mm);
-    }
+    const std::uint32_t base = static_cast<std::uint32_t>(disc) * per_disc_;
+    forWords(base + begin, base + end,
+             [&](std::uint32_t word, std::uint64_t bits) { remove(word, insideOf(word, bits, base, z_mm)); });
+  }
+
+  /// Removes the alive ones of such points without a test. @pre the predicate would put them all inside.
+  void take(int disc, std::uint32_t begin, std::uint32_t end) {
+    const std::uint32_t base = static_cast<std::uint32_t>(disc) * per_disc_;
+    forWords(base + begin, base + end, [&](std::uint32_t word, std::uint64_t bits) { remove(word, bits); });
   }
 
   /// True when the point was alive and is now removed. @pre as cut().
   bool cutOne(std::uint32_t index, int disc) {
-    const std::uint32_t base = static_cast<std::uint32_t>(disc) * per_disc_;
-    const std::uint64_t bit = std::uint64_t{1} << (index & 63);
+    const std::uint64_t bits = volume_.alive[index >> 6] & (std::uint64_t{1} << (index & 63));
     const std::uint64_t gone =
-        cutWord(index >> 6, volume_.alive[index >> 6] & bit, base, volume_.lattice.discZ_mm(disc));
-    volume_.alive[index >> 6] &= ~gone;
+        insideOf(index >> 6, bits, static_cast<std::uint32_t>(disc) * per_disc_, volume_.lattice.discZ_mm(disc));
+    remove(index >> 6, gone);
     return gone != 0;
   }
 
-  /// Puts indices that were removed in descending order, since `count` were removed, into ascending order.
-  void reverseSince(std::uint64_t count) {
-    std::reverse(tools_.indices.get() + count, tools_.indices.get() + removal_.count);
-  }
+  void takeOne(std::uint32_t index) { remove(index >> 6, std::uint64_t{1} << (index & 63)); }
 
-  [[nodiscard]] Removal removal() const {
-    Removal removal = removal_;
-    removal.indices = {tools_.indices.get(), static_cast<std::size_t>(removal_.count)};
-    return removal;
+  [[nodiscard]] Removal finish() {
+    flush();
+    return removal_;
   }
+  [[nodiscard]] const point_volume::PointVolume& volume() const { return volume_; }
 
  private:
+  /// each(word, alive bits of it) for the words that hold first .. end-1 and have any.
+  template <class Each>
+  void forWords(std::uint32_t first, std::uint32_t end, const Each& each) {
+    if (first >= end) return;
+    const std::uint32_t last = end - 1;
+    for (std::uint32_t word = first >> 6; word <= last >> 6; ++word) {
+      std::uint64_t bits = volume_.alive[word];
+      if (word == first >> 6) bits &= ~std::uint64_t{0} << (first & 63);
+      if (word == last >> 6) bits &= ~std::uint64_t{0} >> (63 - (last & 63));
+      if (bits != 0) each(word, bits);
+    }
+  }
+
   /// The bits of `bits` whose points are inside the bit.
-  std::uint64_t cutWord(std::uint32_t word, std::uint64_t bits, std::uint32_t base, double z_mm) {
-    std::uint64_t gone = 0;
-    while (bits != 0) {
-      const std::uint64_t lowest = bits & (~bits + 1);
+  std::uint64_t insideOf(std::uint32_t word, std::uint64_t bits, std::uint32_t base, double z_mm) {
+    std::uint64_t inside = 0;
+    for (; bits != 0; bits &= bits - 1) {
       const std::uint32_t index = (word << 6) + static_cast<std::uint32_t>(__builtin_ctzll(bits));
-      bits ^= lowest;
       ++removal_.tested;
       const Vec3 point_mm{tools_.table.x_mm[index - base], tools_.table.y_mm[index - base], z_mm};
-      if (!isInside(tools_.shape, pose_.tip_mm, pose_.axis, point_mm)) continue;
-      gone |= lowest;
-      tools_.indices[removal_.count++] = index;
-      removal_.density_sum_mg_cm3 += volume_.density_mg_cm3[index];
-      removal_.hash_delta += mix64(index);
+      if (isInside(tools_.shape, pose_.tip_mm, pose_.axis, point_mm)) inside |= bits & (~bits + 1);
     }
-    return gone;
+    return inside;
+  }
+
+  /// @pre the points of `gone` are alive.
+  void remove(std::uint32_t word, std::uint64_t gone) {
+    if (gone == 0) return;
+    std::uint64_t& alive = volume_.alive[word];
+    removal_.hash_delta -= point_volume::wordHash(word, alive);
+    alive &= ~gone;
+    removal_.hash_delta += point_volume::wordHash(word, alive);
+    if (held_ + 64 > indices_.size()) flush();
+    const std::uint32_t first = word << 6;
+    std::uint32_t* to = indices_.data() + held_;
+    const std::uint16_t* density = volume_.density_mg_cm3.data() + first;
+    std::uint64_t sum = 0;
+    if (gone == ~std::uint64_t{0}) {  // loops that vectorise
+      for (std::uint32_t i = 0; i < 64; ++i) *to++ = first + i;
+      std::uint32_t whole = 0;
+      for (std::uint32_t i = 0; i < 64; ++i) whole += density[i];
+      sum = whole;
+    } else {
+      for (; gone != 0; gone &= gone - 1) {
+        const auto i = static_cast<std::uint32_t>(__builtin_ctzll(gone));
+        *to++ = first + i;
+        sum += density[i];
+      }
+    }
+    const auto held = static_cast<std::uint32_t>(to - indices_.data());
+    removal_.density_sum_mg_cm3 += sum;
+    removal_.count += held - held_;
+    held_ = held;
+  }
+
+  void flush() {
+    if (held_ != 0) sink_({indices_.data(), held_});
+    held_ = 0;
   }
 
   const Tools& tools_;
   point_volume::PointVolume& volume_;
   const BitPose& pose_;
+  RemovedSink sink_;
   std::uint32_t per_disc_;
   Removal removal_;
+  std::uint32_t held_ = 0;
+  std::array<std::uint32_t, 256> indices_;
 };
 
 [[nodiscard]] std::unique_ptr<Engine> makeReference(const point_volume::Lattice& lattice, const plan::Bit& bit);
 [[nodiscard]] std::unique_ptr<Engine> makeReport(const point_volume::Lattice& lattice, const plan::Bit& bit);
 [[nodiscard]] std::unique_ptr<Engine> makeBounded(const point_volume::Lattice& lattice, const plan::Bit& bit);
+[[nodiscard]] std::unique_ptr<Engine> makeClearance(const point_volume::Lattice& lattice, const plan::Bit& bit);
 
 }  // namespace spinaltap::drill

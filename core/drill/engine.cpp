@@ -11,10 +11,11 @@ Result<std::unique_ptr<Engine>> makeEngine(std::string_view name, const point_vo
   if (name == "reference") return makeReference(volume.lattice, bit);
   if (name == "report") return makeReport(volume.lattice, bit);
   if (name == "bounded") return makeBounded(volume.lattice, bit);
-  return fail(ErrorCode::NotFound,
-              "no engine '" + std::string(name.substr(0, 40)) + "': there are reference, report and bounded");
+  if (name == "clearance") return makeClearance(volume.lattice, bit);
+  return fail(ErrorCode::NotFound, "no engine '" + std::string(name.substr(0, 40)) +
+                                       "': there are reference, report, bounded and clearance");
 }
 
-std::vector<std::string_view> engineNames() { return {"reference", "report", "bounded"}; }
+std::vector<std::string_view> engineNames() { return {"reference", "report", "bounded", "clearance"}; }
 
 }  // namespace spinaltap::drill

@@ -1,11 +1,13 @@
 // core/drill/engine.h - exact removal of points by the bit, one pose a cycle.
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string_view>
 #include <vector>
 
+#include "core/base/function_ref.h"
 #include "core/base/result.h"
 #include "core/base/vec3.h"
 #include "core/plan/path.h"
@@ -19,14 +21,23 @@ struct BitPose {
   Vec3 axis{0, 0, 1};  ///< unit vector from the shank to the tip: the direction of drilling, +z on the path
 };
 
-/// What one cycle removed. `indices` is valid until the next call; ascending order.
+/// What one step removed.
 struct Removal {
   std::uint64_t count = 0;
   std::uint64_t density_sum_mg_cm3 = 0;  ///< exact, order-independent
-  std::uint64_t hash_delta = 0;          ///< sum of mix64(index) modulo 2^64: order-independent
+  std::uint64_t hash_delta = 0;          ///< change of aliveHash (point_volume.h), modulo 2^64
   std::uint64_t tested = 0;              ///< points put to the predicate
-  std::span<const std::uint32_t> indices;
+
+  Removal& operator+=(const Removal& other) {
+    count += other.count, density_sum_mg_cm3 += other.density_sum_mg_cm3;
+    hash_delta += other.hash_delta, tested += other.tested;
+    return *this;
+  }
 };
+
+/// Is handed the indices of removed points, each once, in no order, a few at a time: a step that removes the whole bit
+/// needs no more memory than one that removes a point.
+using RemovedSink = FunctionRef<void(std::span<const std::uint32_t>)>;
 
 /// The removal contract. After step(), every alive point of `volume` that the predicate (predicate.h) puts inside
 /// the bit at `pose` is removed, and no other is touched. (`report` breaks the first half, as published.)
@@ -38,8 +49,14 @@ class Engine {
   Engine& operator=(const Engine&) = delete;
 
   [[nodiscard]] virtual std::string_view name() const = 0;
-  /// @pre `volume` is the one the engine was made for; pose is finite, its axis a unit vector to 1e-9.
-  virtual Removal step(point_volume::PointVolume& volume, const BitPose& pose) = 0;
+  /// @pre `volume` is the one the engine was made for, and no point of it has come alive since; pose is finite, its
+  ///      axis a unit vector to 1e-9.
+  virtual Removal step(point_volume::PointVolume& volume, const BitPose& pose, RemovedSink removed) = 0;
+  Removal step(point_volume::PointVolume& volume, const BitPose& pose) {
+    return step(volume, pose, [](std::span<const std::uint32_t>) {});
+  }
+  /// What the engine holds besides the volume, its own tables included.
+  [[nodiscard]] virtual std::size_t bytes() const = 0;
 
  protected:
   Engine() = default;
@@ -47,7 +64,8 @@ class Engine {
 
 /// `reference`: every alive point, every cycle; the truth for all others.
 /// `report`:    the 2002 algorithm as published; the rival in benchmarks.
-/// `bounded`:   as reference, but only on the discs and rings that the bit can reach; what the program uses.
+/// `bounded`:   as reference, but only on the discs, rings and slots that the bit can reach.
+/// `clearance`: as bounded, but only where the bit can have come nearer to bone than was known; what the program uses.
 /// @error NotFound, naming the engines there are.
 [[nodiscard]] Result<std::unique_ptr<Engine>> makeEngine(std::string_view name, const point_volume::PointVolume& volume,
                                                          const plan::Bit& bit);

@@ -8,12 +8,14 @@ class Reference final : public Engine {
  public:
   Reference(const point_volume::Lattice& lattice, const plan::Bit& bit) : tools_(lattice, bit) {}
 
+  using Engine::step;
   [[nodiscard]] std::string_view name() const override { return "reference"; }
+  [[nodiscard]] std::size_t bytes() const override { return tools_.bytes(); }
 
-  Removal step(point_volume::PointVolume& volume, const BitPose& pose) override {
-    Cutter cutter(tools_, volume, pose);
+  Removal step(point_volume::PointVolume& volume, const BitPose& pose, RemovedSink removed) override {
+    Cutter cutter(tools_, volume, pose, removed);
     for (int disc = 0; disc < volume.lattice.discs; ++disc) cutter.cut(disc, 0, volume.lattice.pointsPerDisc());
-    return cutter.removal();
+    return cutter.finish();
   }
 
  private:

@@ -30,11 +30,13 @@ class Report final : public Engine {
   Report(const Lattice& lattice, const plan::Bit& bit)
       : tools_(lattice, bit), innermost_(static_cast<std::size_t>(lattice.discs), 0) {}
 
+  using Engine::step;
   [[nodiscard]] std::string_view name() const override { return "report"; }
+  [[nodiscard]] std::size_t bytes() const override { return tools_.bytes() + innermost_.size() * sizeof(int); }
 
-  Removal step(point_volume::PointVolume& volume, const BitPose& pose) override {
+  Removal step(point_volume::PointVolume& volume, const BitPose& pose, RemovedSink removed) override {
     const Lattice& lattice = volume.lattice;
-    Cutter cutter(tools_, volume, pose);
+    Cutter cutter(tools_, volume, pose, removed);
     const double tip = pose.tip_mm.z / lattice.spacing_mm - static_cast<double>(lattice.first_disc);
     const double base = tip - tools_.shape.cone_mm * pose.axis.z / lattice.spacing_mm;
     const int first = static_cast<int>(std::floor(held(std::min(tip, base), lattice.discs)));
@@ -42,7 +44,7 @@ class Report final : public Engine {
     for (int disc = std::max(first, 0); disc <= std::min(last, lattice.discs - 1); ++disc) {
       cutDisc(cutter, volume, pose, disc);
     }
-    return cutter.removal();
+    return cutter.finish();
   }
 
  private:
@@ -98,12 +100,10 @@ class Report final : public Engine {
       }
     }
     if (!in_arc || !from_start) return;
-    const std::uint64_t before = cutter.removal().count;
     for (int back = slots - 1; back > slot; --back) {
       const std::uint32_t index = indexOf(volume.lattice, disc, ring, back);
       if (volume.isAlive(index) && !cutter.cutOne(index, disc)) break;
     }
-    cutter.reverseSince(before);
   }
 
   Tools tools_;

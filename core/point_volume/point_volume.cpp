@@ -28,4 +28,10 @@ std::uint64_t countAlive(const PointVolume& volume) {
   return count;
 }
 
+std::uint64_t aliveHash(const PointVolume& volume) {
+  std::uint64_t hash = 0;
+  for (std::uint32_t word = 0; word < volume.alive.size(); ++word) hash += wordHash(word, volume.alive[word]);
+  return hash;
+}
+
 }  // namespace spinaltap::point_volume

@@ -7,6 +7,7 @@
 
 #include "core/base/field.h"
 #include "core/base/frame.h"
+#include "core/base/hash.h"
 #include "core/point_volume/lattice.h"
 
 namespace spinaltap::point_volume {
@@ -42,5 +43,12 @@ using HuSampler = std::function<void(std::span<const Vec3>, std::span<double>)>;
                                               const HuSampler& hu, unsigned threads = 0);
 
 [[nodiscard]] std::uint64_t countAlive(const PointVolume& volume);
+
+/// Which points are alive, in 64 bits: the sum over all words modulo 2^64, so that a cycle pays for the words it
+/// changes.
+[[nodiscard]] constexpr std::uint64_t wordHash(std::uint32_t word, std::uint64_t alive) {
+  return mix64(alive ^ (std::uint64_t{word} * 0x9e3779b97f4a7c15ULL));
+}
+[[nodiscard]] std::uint64_t aliveHash(const PointVolume& volume);
 
 }  // namespace spinaltap::point_volume

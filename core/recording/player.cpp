@@ -10,12 +10,13 @@ Result<Player> Player::create(Recording recording) {
   player.recording_ = std::move(recording);
   std::string& engine = player.recording_.header.config.engine;
   const std::string recorded_engine = engine;
-  if (engine == "reference") engine = "bounded";
+  if (engine == "reference") engine = "clearance";
   player.moments_.reserve(player.recording_.inputs.size());
-  const auto keep = [&](const session::Input& input, const session::Output& output) {
+  const auto keep = [&](const session::Input& input, const session::Output& output,
+                        std::span<const std::uint32_t> removed) {
     if (output.status != session::Status::Ok) return;
     player.moments_.push_back({input, output.thrust_N, output.depth_mm, output.removed_total});
-    player.removed_.insert(player.removed_.end(), output.removed_indices.begin(), output.removed_indices.end());
+    player.removed_.insert(player.removed_.end(), removed.begin(), removed.end());
   };
   const Result<ReplayReport> report = replay(player.recording_, {}, keep);
   if (!report) return tl::unexpected(report.error());

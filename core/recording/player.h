@@ -18,7 +18,7 @@ struct Moment {
 /// Memory: 4 bytes a removed point and about 100 bytes a cycle.
 class Player {
  public:
-  /// Recordings of the engine `reference` are run with `bounded`, which removes the same points and is some hundred
+  /// Recordings of the engine `reference` are run with `clearance`, which removes the same points and is some hundred
   /// times faster; that the hashes then agree is still proof. @error as replay.
   [[nodiscard]] static Result<Player> create(Recording recording);
 

@@ -73,8 +73,9 @@ struct ReplayReport {
   std::uint64_t first_difference = 0;  ///< cycle of the first checkpoint that differs; 0 when none does
 };
 
-/// each(input, output), refused inputs included; output.removed_indices is valid during the call.
-using Observer = std::function<void(const session::Input&, const session::Output&)>;
+/// each(input, output, removed), refused inputs included; the indices removed are valid during the call.
+using Observer =
+    std::function<void(const session::Input&, const session::Output&, std::span<const std::uint32_t> removed)>;
 
 /// Runs the inputs through a fresh session. progress(fraction) and each may be empty.
 /// @error as session::Session::create.

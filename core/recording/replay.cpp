@@ -45,9 +45,13 @@ Result<ReplayReport> replay(const Recording& recording, const std::function<void
   report.state_hash = session->stateHash();
   Comparison comparison(recording.checkpoints);
   comparison.at(0, report.state_hash);
+  std::vector<std::uint32_t> removed;
   for (std::size_t i = 0; i < recording.inputs.size(); ++i) {
-    const session::Output output = session->step(recording.inputs[i]);
-    if (each) each(recording.inputs[i], output);
+    removed.clear();
+    const session::Output output = session->step(recording.inputs[i], [&](std::span<const std::uint32_t> some) {
+      if (each) removed.insert(removed.end(), some.begin(), some.end());
+    });
+    if (each) each(recording.inputs[i], output, removed);
     report.cycles = output.cycle;
     report.state_hash = output.state_hash;
     comparison.at(output.cycle, output.state_hash);

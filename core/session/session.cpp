@@ -45,16 +45,27 @@ Result<Session> Session::create(point_volume::PointVolume volume, const Config& 
 }
 
 Session::Session(point_volume::PointVolume volume, Config config, std::unique_ptr<drill::Engine> engine)
-    : volume_(std::move(volume)), config_(std::move(config)), engine_(std::move(engine)) {}
+    : volume_(std::move(volume)),
+      config_(std::move(config)),
+      engine_(std::move(engine)),
+      sweep_(volume_.lattice, config_.bit) {}
 
-Output Session::step(const Input& input) noexcept {
+Output Session::step(const Input& input, drill::RemovedSink removed) noexcept {
   Output output;
   const double axis_length = norm(input.axis);
   output.status = statusOf(input, axis_length);
   if (output.status == Status::Ok && cycle_ > 0 && input.t_us < last_t_us_) output.status = Status::RefusedTime;
+  if (output.status == Status::Ok && !sweep_.add({input.tip_mm, input.axis / axis_length}, input.spinning)) {
+    output.status = Status::RefusedBehind;
+  }
   if (output.status == Status::Ok) {
     drill::Removal removal;
-    if (input.spinning) removal = engine_->step(volume_, {input.tip_mm, input.axis / axis_length});
+    for (int cuts = 0; cuts < kMostCuts; ++cuts) {
+      const std::optional<drill::BitPose> pose = sweep_.next();
+      if (!pose) break;
+      removal += engine_->step(volume_, *pose, removed);
+    }
+    output.behind = !sweep_.done();
     // The client's clock has no known origin, so the first cycle lasts no time; its mass waits for the second.
     const std::uint64_t elapsed_us = cycle_ > 0 ? input.t_us - last_t_us_ : 0;
     const double removed_mg = static_cast<double>(removal.density_sum_mg_cm3) *
@@ -66,7 +77,6 @@ Output Session::step(const Input& input) noexcept {
     density_total_ += removal.density_sum_mg_cm3;
     removed_hash_ += removal.hash_delta;
     output.removed = removal.count;
-    output.removed_indices = removal.indices;
     output.depth_mm = input.tip_mm.z;
   }
   output.cycle = cycle_;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/drill/engine.h"
+#include "core/drill/sweep.h"
 #include "core/haptics/thrust.h"
 #include "core/plan/path.h"
 #include "core/point_volume/point_volume.h"
@@ -26,6 +27,7 @@ enum class Status : std::uint8_t {
   RefusedNotFinite = 1,  ///< a component is NaN or infinite, or beyond 1e6 mm
   RefusedAxis = 2,       ///< the axis has no direction (length below 1e-6 or above 1e6)
   RefusedTime = 3,       ///< t_us fell
+  RefusedBehind = 4,     ///< too many poses wait: each moved farther than a cycle can cut
 };
 
 /// A refused input leaves the state untouched, gives zero thrust, and is not counted as a cycle.
@@ -33,17 +35,21 @@ struct Output {
   Status status = Status::Ok;
   std::uint64_t cycle = 0;    ///< accepted inputs so far, this one included
   std::uint64_t removed = 0;  ///< points removed by this cycle
+  bool behind = false;        ///< the motion up to here is not all cut yet; later cycles go on with it
   std::uint64_t removed_total = 0;
   double thrust_N = 0;
   double depth_mm = 0;           ///< of the tip past the entry point along the path; negative before it
   std::uint64_t state_hash = 0;  ///< of the removed set, the accumulated density, the force and the cycle count
-  std::span<const std::uint32_t> removed_indices;  ///< valid until the next step
 };
 
 struct Config {
   plan::Bit bit;
-  std::string engine = "bounded";
+  std::string engine = "clearance";
 };
+
+/// A cycle cuts at no more than so many places (sweep.h): 3.2 mm of motion at a spacing of 0.1 mm. What is left waits
+/// for the next.
+inline constexpr int kMostCuts = 64;
 
 class Session {
  public:
@@ -51,7 +57,11 @@ class Session {
   [[nodiscard]] static Result<Session> create(point_volume::PointVolume volume, const Config& config);
 
   /// Fixed and total: any input gives a defined output. Does not allocate, lock, throw, log or read a clock.
-  [[nodiscard]] Output step(const Input& input) noexcept;
+  /// `removed` is handed the indices of the points removed, a few at a time, during the call.
+  [[nodiscard]] Output step(const Input& input, drill::RemovedSink removed) noexcept;
+  [[nodiscard]] Output step(const Input& input) noexcept {
+    return step(input, [](std::span<const std::uint32_t>) {});
+  }
 
   [[nodiscard]] const point_volume::PointVolume& volume() const { return volume_; }
   [[nodiscard]] const Config& config() const { return config_; }
@@ -63,6 +73,7 @@ class Session {
   point_volume::PointVolume volume_;
   Config config_;
   std::unique_ptr<drill::Engine> engine_;
+  drill::Sweep sweep_;
   haptics::Thrust thrust_;
   std::uint64_t cycle_ = 0, last_t_us_ = 0;
   std::uint64_t removed_total_ = 0, density_total_ = 0, removed_hash_ = 0;

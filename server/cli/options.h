@@ -66,7 +66,7 @@ struct PlanOptions {
 };
 
 struct DrillOptions {
-  std::string data, case_id, path_id, volume, scene, trace, engine = "bounded", out;
+  std::string data, case_id, path_id, volume, scene, trace, engine = "clearance", out;
   std::optional<std::uint64_t> cycles;
   bool no_store = false;
 };

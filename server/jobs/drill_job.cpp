@@ -45,15 +45,18 @@ std::uint64_t inputsOf(const DrillJob& job, double start_z_mm, double length_mm)
 Result<Run> run(session::Session& session, const DrillJob& job, std::uint64_t inputs, double start_z_mm, Kept& kept,
                 metrics::Accumulator& accumulator, const Progress& progress) {
   Run result;
+  std::vector<std::uint32_t> removed;
   for (std::uint64_t i = 0; i < inputs; ++i) {
     const session::Input input =
         job.scene ? session::sceneInput(*job.scene, i, start_z_mm) : job.trace[static_cast<std::size_t>(i)];
     Stopwatch watch;
-    const session::Output output = session.step(input);
+    removed.clear();
+    const session::Output output = session.step(
+        input, [&](std::span<const std::uint32_t> some) { removed.insert(removed.end(), some.begin(), some.end()); });
     result.step_s += watch.lap_s();
     if (const auto appended = kept.append(input, output); !appended) return tl::unexpected(appended.error());
     if (output.status == session::Status::Ok) {
-      accumulator.add({input.t_us, input.tip_mm, input.axis, input.spinning, output.thrust_N, output.removed_indices});
+      accumulator.add({input.t_us, input.tip_mm, input.axis, input.spinning, output.thrust_N, removed});
       result.cycles = output.cycle;
     } else {
       ++result.refused;
@@ -125,7 +128,7 @@ Result<DrillSite> siteOfPath(store::Store& store, const std::string& case_id, co
   if (!volume) return tl::unexpected(volume.error());
   const auto model = loadModel(store, *row);
   if (!model) return tl::unexpected(model.error());
-  DrillSite site{std::move(*volume), {path->path.bit, "bounded"}, metrics::planOf(path->path), {}, case_id, path_id};
+  DrillSite site{std::move(*volume), {path->path.bit, "clearance"}, metrics::planOf(path->path), {}, case_id, path_id};
   site.field = rbf::asField(*model, lipschitzOf(*model));
   return site;
 }
@@ -134,7 +137,7 @@ Result<DrillSite> siteOfReport() {
   auto volume = session::sceneVolume();
   if (!volume) return tl::unexpected(volume.error());
   metrics::Plan plan{session::reportBit(), session::kReportLength_mm, volume->lattice, {}};
-  return DrillSite{std::move(*volume), {session::reportBit(), "bounded"}, plan, {}, "", ""};
+  return DrillSite{std::move(*volume), {session::reportBit(), "clearance"}, plan, {}, "", ""};
 }
 
 Result<Figures> drill(store::Store* where, DrillSite site, const DrillJob& job, const Progress& progress) {

@@ -33,7 +33,7 @@ struct DrillJob {
   std::optional<session::Scene> scene;  ///< without one: the trace
   std::vector<session::Input> trace;
   std::optional<std::uint64_t> cycles;  ///< of a scene: default as many as the path is long; of a trace: at most
-  std::string engine = "bounded";
+  std::string engine = "clearance";
   std::filesystem::path out;  ///< a recording is written here, whole or not at all; empty: none
   bool keep = false;          ///< also keep the recording with the case
 };

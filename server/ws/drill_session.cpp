@@ -29,6 +29,7 @@ struct Drill {
   jobs::RecordingFile recording;
   std::uint64_t inputs = 0;
   std::optional<std::uint32_t> next_seq;
+  std::vector<std::uint32_t> removed = {};  ///< by the last pose
 };
 
 }  // namespace
@@ -93,13 +94,15 @@ Answer DrillSession::State::poses(const wire::Poses& batch) {
   if (drill->inputs + batch.poses.size() > kMostInputs) return end(refusal("poses: the drill is too long", kPolicy));
   wire::Feedback feedback;
   for (const session::Input& input : batch.poses) {
-    const session::Output output = drill->session.step(input);
+    drill->removed.clear();
+    const session::Output output = drill->session.step(input, [this](std::span<const std::uint32_t> some) {
+      drill->removed.insert(drill->removed.end(), some.begin(), some.end());
+    });
     if (const auto kept = drill->recording.append(input, output); !kept) {
       return end(refusal(kept.error().message, kInternalError));
     }
     if (output.status == session::Status::Ok) {
-      drill->accumulator.add(
-          {input.t_us, input.tip_mm, input.axis, input.spinning, output.thrust_N, output.removed_indices});
+      drill->accumulator.add({input.t_us, input.tip_mm, input.axis, input.spinning, output.thrust_N, drill->removed});
     }
     feedback.status = std::max(feedback.status, output.status);
     feedback.cycle = output.cycle;

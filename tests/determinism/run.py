@@ -69,8 +69,9 @@ def build(name, compiler, flags, work, env):
     if compiler == "em++":  # Debian's header-only libraries through a folder of links: -I/usr/include shadows the sysroot
         links = work / "header_only"
         links.mkdir(exist_ok=True)
-        if not (links / "tl").is_symlink():
-            (links / "tl").symlink_to("/usr/include/tl")
+        for library in ("tl", "hwy"):
+            if not (links / library).is_symlink():
+                (links / library).symlink_to("/usr/include/" + library)
         include += ["-isystem", str(links)]
     launcher = ["ccache"] if shutil.which("ccache") else []
 
@@ -85,7 +86,7 @@ def build(name, compiler, flags, work, env):
         # node 18 and later would fetch the module over a URL that does not exist.
         return ["node", "--no-experimental-fetch", str(program)]
     program = folder / "scene_hash"
-    run([compiler, *flags, target, "-o", str(program)], env)
+    run([compiler, *flags, target, "-o", str(program), "-lhwy"], env)
     return [str(program)]
 
 

@@ -84,13 +84,5 @@ TEST(Report, EqualsTheReferenceBesideThePathOnlyWhileTheBitStaysUpright) {
   }
 }
 
-TEST(Report, GivesItsIndicesInAscendingOrder) {
-  Pair pair;
-  for (int i = 0; i <= 300; ++i) {
-    const Removal removal = pair.report->step(pair.b, {{1, 0.3, 0.02 * i}, kUp});
-    for (std::size_t k = 1; k < removal.indices.size(); ++k) ASSERT_LT(removal.indices[k - 1], removal.indices[k]);
-  }
-}
-
 }  // namespace
 }  // namespace spinaltap::drill

@@ -16,7 +16,7 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-Session makeSession(const std::string& engine = "bounded", int discs = 40) {
+Session makeSession(const std::string& engine = "clearance", int discs = 40) {
   auto session = Session::create(*sceneVolume(discs), {reportBit(), engine});
   EXPECT_TRUE(session.has_value());
   return std::move(*session);
@@ -36,7 +36,6 @@ TEST(Session, CountsWhatItRemovesAndFeelsItAFewCyclesLater) {
   EXPECT_EQ(output.status, Status::Ok);
   EXPECT_EQ(output.cycle, 1u);
   EXPECT_GT(output.removed, 0u);
-  EXPECT_EQ(output.removed, output.removed_indices.size());
   EXPECT_EQ(output.depth_mm, 0.5);
   EXPECT_EQ(output.thrust_N, 0.0);  // the first cycle lasts no time
   output = session.step(pose(6000, 0.6));
@@ -48,7 +47,7 @@ TEST(Session, CountsWhatItRemovesAndFeelsItAFewCyclesLater) {
 TEST(Session, NeedsAboutFourNewtonsInCancellousBoneAtOneMillimetreASecond) {
   // pi/4 * 9 mm2 * 1 mm/s * 0.3 mg/mm3 = 2.1 mg/s at 2 N per mg/s; the lattice's 721 points of 0.00105 mm3 a disc stand
   // for a circle of 1.55 mm, 7 % more.
-  Session session = makeSession("bounded", 200);
+  Session session = makeSession("clearance", 200);
   double sum = 0;
   int count = 0;
   for (int i = 0; i < 15000; ++i) {
@@ -86,7 +85,6 @@ void expectRefused(Session& session, const Input& input, Status status) {
   EXPECT_EQ(output.status, status);
   EXPECT_EQ(output.thrust_N, 0.0);
   EXPECT_EQ(output.removed, 0u);
-  EXPECT_TRUE(output.removed_indices.empty());
   EXPECT_EQ(output.state_hash, hash);
   EXPECT_EQ(session.stateHash(), hash);
   EXPECT_EQ(session.volume().alive, alive);

@@ -149,8 +149,11 @@ TEST(SplatTracker, EqualsAFullScanWhileTheBitWandersThroughRaggedBone) {
     session::Input input{static_cast<std::uint64_t>(1000 * cycle), {}, {}, true};
     input.tip_mm = {random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), -0.3 + 0.001 * cycle};
     input.axis = normalized({random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), 1});
-    const session::Output output = session.step(input);
-    tracker.update(session.volume(), output.removed_indices, {input.tip_mm, input.axis, 0.4, 0.6});
+    std::vector<std::uint32_t> removed;
+    const session::Output output = session.step(
+        input, [&](std::span<const std::uint32_t> some) { removed.insert(removed.end(), some.begin(), some.end()); });
+    ASSERT_EQ(output.removed, removed.size());
+    tracker.update(session.volume(), removed, {input.tip_mm, input.axis, 0.4, 0.6});
     if (cycle % 16 == 0) client.take(tracker, session.volume());
     if (cycle % 160 == 0) client.expectEquals(scan(session.volume(), before));
     if (HasFatalFailure()) FAIL() << "cycle " << cycle;

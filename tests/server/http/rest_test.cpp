@@ -235,7 +235,7 @@ TEST_F(Rest, OnLoopbackAnswersOnlyToNamesOfThisMachine) {
 TEST_F(Rest, MakesSessionsOnlyForPathsThatExist) {
   const Reply reply = post(port(), "/api/v1/sessions", {{"case_id", small_.case_id}, {"path_id", small_.path_id}});
   ASSERT_EQ(reply.status, 201);
-  EXPECT_EQ(reply.json()["engine"], "bounded");
+  EXPECT_EQ(reply.json()["engine"], "clearance");
   EXPECT_EQ(reply.json()["config"]["bit"]["diameter_mm"], 3.0);
   expectProblem(post(port(), "/api/v1/sessions", {{"case_id", small_.case_id}, {"path_id", "pzz"}}), 404);
   expectProblem(post(port(), "/api/v1/sessions", {{"case_id", bare_}, {"path_id", small_.path_id}}), 404);

@@ -36,7 +36,7 @@ export class DrillSession {
   async open(case_id: string, path: PathInfo, point_volume: Uint8Array): Promise<void> {
     let socket_url: string | null = null;
     let offline_reason = "";
-    let engine = "bounded";
+    let engine = "clearance";
     try {
       const session = await createSession(case_id, path.id);
       socket_url = socketUrl(session.id);

@@ -1,0 +1,243 @@
+// The reference's removed set at about the cost of what changes.
+//
+// The bit's section with a disc lies in a circle (section.h), and what it can remove is the disc's alive points within.
+// Two things are remembered, and since points only die, both stay true for good, whatever the bit does:
+//  - for each disc a circle that holds no alive point. While the section stays in it, the disc needs no look; one
+//    comparison a disc and cycle says so.
+//  - for each ring of a disc a gap, a run of slots that holds no alive point. Seen from the section's centre, a ring's
+//    nearest slots are those nearest to the centre's direction; if that lies in the gap, the gap's ends bound the
+//    distance to everything alive on the ring.
+// So a cycle looks at the discs whose circle is used up, on them at the rings whose gap's ends are within reach, and
+// walks there from alive point to alive point, away from the centre's direction, as far as the circle reaches.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/base/dmath.h"
+#include "core/drill/bounds.h"
+#include "core/drill/cutter.h"
+#include "core/drill/section.h"
+#include "core/drill/simd_clearance.h"
+
+namespace spinaltap::drill {
+namespace {
+
+using point_volume::Lattice;
+using point_volume::PointVolume;
+
+constexpr double kFar = 1e18;  // squared mm, and finite as a single
+
+// After so many points taken from a ring in a row, the rest of the arc is taken at once.
+constexpr int kLongWalk = 3;
+
+double squared(double x) { return x * x; }
+
+template <class Slot>
+class Clearance final : public Engine {
+ public:
+  Clearance(const Lattice& lattice, const plan::Bit& bit)
+      : tools_(lattice, bit),
+        circles_(3 * padded(lattice.discs), -1.0F),
+        first_ring_(static_cast<std::size_t>(lattice.discs), 0),
+        gap_low_(padded(lattice.discs * lattice.rings)),
+        gap_high_(padded(lattice.discs * lattice.rings), 1),
+        half_slot_rad_(padded(lattice.rings)) {
+    for (int k = 1; k < lattice.rings; ++k)
+      half_slot_rad_[static_cast<std::size_t>(k)] = static_cast<float>(kPi / 6 / k);
+    known_.x_mm = circles_.data();
+    known_.y_mm = known_.x_mm + padded(lattice.discs);
+    known_.radius_mm = known_.y_mm + padded(lattice.discs);
+    known_.first_ring = first_ring_.data();
+    known_.low = gap_low_.data();
+    known_.high = gap_high_.data();
+    known_.half_slot_rad = half_slot_rad_.data();
+    known_.rings = lattice.rings;
+    known_.rings_per_mm = static_cast<float>(1.0 / lattice.spacing_mm);
+    known_.spacing_mm = static_cast<float>(lattice.spacing_mm);
+  }
+
+  using Engine::step;
+  [[nodiscard]] std::string_view name() const override { return "clearance"; }
+  [[nodiscard]] std::size_t bytes() const override {
+    return tools_.bytes() + (circles_.size() + half_slot_rad_.size()) * sizeof(float) +
+           first_ring_.size() * sizeof(std::uint16_t) + 2 * gap_low_.size() * sizeof(Slot);
+  }
+
+  Removal step(PointVolume& volume, const BitPose& pose, RemovedSink removed) override {
+    Cutter cutter(tools_, volume, pose, removed);
+    const Sections sections(tools_.shape, pose, volume.lattice);
+    if (sections.isFlat()) {
+      for (int disc = sections.first(); disc <= sections.last(); ++disc) {
+        cutter.cut(disc, 0, volume.lattice.pointsPerDisc());
+      }
+      return cutter.finish();
+    }
+    known_.margin_mm = static_cast<float>(sections.margin_mm());
+    SectionLine line = sections.line();
+    for (int first = sections.first(); first <= sections.last(); first += kMostDiscs) {
+      std::array<Touched, kMostDiscs + 1> touched;
+      const int count =
+          findTouched(line, known_, first, std::min(kMostDiscs, sections.last() + 1 - first), touched.data());
+      for (int i = 0; i < count; ++i) visit(cutter, sections, touched[static_cast<std::size_t>(i)]);
+      line.along_0 -= static_cast<float>(kMostDiscs) * line.along_step;
+    }
+    return cutter.finish();
+  }
+
+ private:
+  struct Disc {
+    int disc;
+    Section section;
+    float turn;  ///< the direction of the section's centre
+  };
+
+  static std::size_t padded(int count) { return static_cast<std::size_t>(count) + kPadding; }
+
+  void visit(Cutter& cutter, const Sections& sections, const Touched& touched) {
+    const int disc = touched.disc, rings = cutter.volume().lattice.rings;
+    const Disc at{disc, sections.at(disc), touched.turn};
+    double nearest = touched.beyond_mm2;
+    if (touched.whole >= known_.first_ring[disc]) nearest = std::min(nearest, cutWhole(cutter, at, touched.whole));
+    for (std::uint64_t bits = touched.rings; bits != 0; bits &= bits - 1) {
+      const int first = touched.first + __builtin_ctzll(bits) * touched.group;
+      const int end = std::min(first + touched.group, rings);
+      for (int ring = first; ring < end; ++ring) nearest = std::min(nearest, cutRing(cutter, at, ring));
+    }
+    known_.radius_mm[disc] = static_cast<float>(std::sqrt(nearest) - sections.margin_mm());
+  }
+
+  /// Cuts rings up to `whole`, all of whose points are in the outer circle; returns 0 if any of them stays alive.
+  double cutWhole(Cutter& cutter, const Disc& at, int whole) {
+    const Lattice& lattice = cutter.volume().lattice;
+    std::uint16_t& first = known_.first_ring[at.disc];
+    const double away = std::sqrt(squared(at.section.x_mm) + squared(at.section.y_mm));
+    const int sure = static_cast<int>(
+        std::min(std::floor((at.section.inner_mm - away) / lattice.spacing_mm), static_cast<double>(whole)));
+    const int split = std::max<int>(first, sure + 1);
+    cutter.take(at.disc, Lattice::ringStart(first), Lattice::ringStart(split));
+    cutter.cut(at.disc, Lattice::ringStart(split), Lattice::ringStart(whole + 1));
+    first = static_cast<std::uint16_t>(firstRing(cutter.volume(), at.disc, first));
+    return first <= whole ? 0.0 : kFar;
+  }
+
+  /// The first ring of a disc that has alive points, from `ring` on; as many as there are rings when there is none.
+  static int firstRing(const PointVolume& volume, int disc, int ring) {
+    const std::uint32_t per_disc = volume.lattice.pointsPerDisc(), base = static_cast<std::uint32_t>(disc) * per_disc;
+    const std::uint32_t at = firstAlive(volume, base + Lattice::ringStart(ring), base + per_disc) - base;
+    while (ring < volume.lattice.rings && Lattice::ringStart(ring + 1) <= at) ++ring;
+    return ring;
+  }
+
+  /// Walks from the centre's direction to both sides, and returns the squared distance of the nearest that stays alive.
+  double cutRing(Cutter& cutter, const Disc& at, int ring) {
+    const std::size_t gap = known_.gap(at.disc, ring);
+    const int slots = Lattice::slotsOf(ring), half = slots / 2;
+    const int below = std::min(static_cast<int>(at.turn * static_cast<float>(slots)), slots - 1);
+    const auto slotAt = [&](int offset) {
+      const int slot = below + offset;
+      return slot < 0 ? slot + slots : slot >= slots ? slot - slots : slot;
+    };
+    // In a gap, the walk begins at its ends.
+    const int low = gap_low_[gap], past = below >= low ? below - low : below - low + slots;
+    const int between = gap_high_[gap] - low, width = between > 0 ? between : between + slots;
+    const bool in_gap = past < width;
+    double nearest = kFar;
+    const int up_end = half + 1, down_end = -half;  // between them, every slot of the ring once
+    const int up = walk(cutter, at, ring, in_gap ? std::min(width - past, up_end) : 1, up_end, nearest, slotAt);
+    const int down = walk(cutter, at, ring, in_gap ? std::max(-past, down_end) : 0, down_end, nearest, slotAt);
+    // A dead ring's gap is all but one slot, and that one lies opposite.
+    const bool dead = up == up_end && down == down_end;
+    gap_low_[gap] = static_cast<Slot>(slotAt(dead ? half : down));
+    gap_high_[gap] = static_cast<Slot>(slotAt(dead ? half : up));
+    return nearest;
+  }
+
+  /// From one offset towards another, that one excluded; returns the offset of the first point that stays alive, or
+  /// `to`.
+  template <class SlotAt>
+  int walk(Cutter& cutter, const Disc& at, int ring, int from, int to, double& nearest, const SlotAt& slotAt) {
+    const PointVolume& volume = cutter.volume();
+    const std::uint32_t in_disc = Lattice::ringStart(ring);
+    const std::uint32_t start = static_cast<std::uint32_t>(at.disc) * volume.lattice.pointsPerDisc() + in_disc;
+    const double outer = squared(at.section.outer_mm);
+    const double inner = at.section.inner_mm > 0 ? squared(at.section.inner_mm) : -1.0;
+    const int step = to > from ? 1 : -1;
+    int first = to, taken = 0;
+    for (int offset = from; offset != to; offset += step) {
+      const auto slot = static_cast<std::uint32_t>(slotAt(offset));
+      if (!volume.isAlive(start + slot)) continue;
+      const double distance = squared(tools_.table.x_mm[in_disc + slot] - at.section.x_mm) +
+                              squared(tools_.table.y_mm[in_disc + slot] - at.section.y_mm);
+      if (distance <= outer) {
+        if (distance <= inner) {
+          cutter.takeOne(start + slot);
+          if (++taken == kLongWalk) offset = takeArc(cutter, at, ring, offset, to, slotAt);
+          continue;
+        }
+        if (cutter.cutOne(start + slot, at.disc)) continue;
+      }
+      nearest = std::min(nearest, distance);
+      if (first == to) first = offset;
+      if (distance > outer) break;
+    }
+    return first;
+  }
+
+  /// Takes what lies between an offset and the end of the arc inside the inner circle, or `to`; returns the last
+  /// offset.
+  template <class SlotAt>
+  int takeArc(Cutter& cutter, const Disc& at, int ring, int offset, int to, const SlotAt& slotAt) {
+    const Section& section = at.section;
+    const double radius = ring * cutter.volume().lattice.spacing_mm;
+    const double away = std::sqrt(squared(section.x_mm) + squared(section.y_mm));
+    const double cosine = (squared(away) + squared(radius) - squared(section.inner_mm)) / (2 * away * radius);
+    if (!(cosine < 1.0)) return offset;
+    const double half_arc = (cosine > -1.0 ? roughArcCos(cosine) : kPi) - 3 * kAngleError_rad;
+    // The direction of the centre lies within a slot above offset 0.
+    const int slots = Lattice::slotsOf(ring), step = to > offset ? 1 : -1;
+    const int sure = static_cast<int>(half_arc * (slots / (2 * kPi))) - 1;
+    const int last = step > 0 ? std::min(sure, to - 1) : std::max(-sure, to + 1);
+    if ((last - offset) * step <= 0) return offset;
+    const int low = slotAt(std::min(offset + step, last)), high = slotAt(std::max(offset + step, last));
+    const std::uint32_t start = Lattice::ringStart(ring);
+    const auto take = [&](int begin, int end) {
+      cutter.take(at.disc, start + static_cast<std::uint32_t>(begin), start + static_cast<std::uint32_t>(end));
+    };
+    if (low <= high) {
+      take(low, high + 1);
+    } else {
+      take(low, slots);
+      take(0, high + 1);
+    }
+    return last;
+  }
+
+  /// The first alive point of begin .. end-1, or end.
+  static std::uint32_t firstAlive(const PointVolume& volume, std::uint32_t begin, std::uint32_t end) {
+    if (begin >= end) return end;
+    std::uint64_t bits = volume.alive[begin >> 6] & (~std::uint64_t{0} << (begin & 63));
+    for (std::uint32_t word = begin >> 6;;) {
+      if (bits != 0) return std::min(end, (word << 6) + static_cast<std::uint32_t>(__builtin_ctzll(bits)));
+      if (++word > (end - 1) >> 6) return end;
+      bits = volume.alive[word];
+    }
+  }
+
+  Tools tools_;
+  std::vector<float> circles_;
+  std::vector<std::uint16_t> first_ring_;
+  std::vector<Slot> gap_low_, gap_high_;
+  std::vector<float> half_slot_rad_;
+  Known<Slot> known_{};  ///< views of the vectors above
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> makeClearance(const Lattice& lattice, const plan::Bit& bit) {
+  if (Lattice::slotsOf(lattice.rings) < 256) return std::make_unique<Clearance<std::uint8_t>>(lattice, bit);
+  return std::make_unique<Clearance<std::uint16_t>>(lattice, bit);
+}
+
+}  // namespace spinaltap::drill
