@@ -108,7 +108,7 @@ TEST(Usage, CoordinatesMayBeNegativeInEveryForm) {
 
 TEST(Usage, VersionTellsTheEngines) {
   const Json version = run({"version", "--json"}).json();
-  EXPECT_EQ(version["engines"].size(), 3u);
+  EXPECT_EQ(version["engines"].size(), 4u);
   EXPECT_EQ(run({"--version"}).out, version["version"].get<std::string>() + "\n");
 }
 
