@@ -11,13 +11,15 @@
 // walks there from alive point to alive point, away from the centre's direction, as far as the circle reaches.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
-#include <limits>
+#include <memory>
 #include <vector>
 
 #include "core/base/dmath.h"
 #include "core/drill/bounds.h"
 #include "core/drill/cutter.h"
+#include "core/drill/second_thread.h"
 #include "core/drill/section.h"
 #include "core/drill/simd_clearance.h"
 
@@ -29,6 +31,9 @@ using point_volume::PointVolume;
 
 constexpr double kFar = 1e18;  // squared mm, and finite as a single
 
+// Fewer discs than that are not worth sharing.
+constexpr int kLeastShared = 3 * static_cast<int>(kPadding);
+
 // After so many points taken from a ring in a row, the rest of the arc is taken at once.
 constexpr int kLongWalk = 3;
 
@@ -37,8 +42,8 @@ double squared(double x) { return x * x; }
 template <class Slot>
 class Clearance final : public Engine {
  public:
-  Clearance(const Lattice& lattice, const plan::Bit& bit)
-      : tools_(lattice, bit),
+  Clearance(const Lattice& lattice, const plan::Bit& bit, const EngineOptions& options)
+      : tools_(lattice, bit, options.precision),
         circles_(3 * padded(lattice.discs), -1.0F),
         first_ring_(static_cast<std::size_t>(lattice.discs), 0),
         gap_low_(padded(lattice.discs * lattice.rings)),
@@ -54,6 +59,7 @@ class Clearance final : public Engine {
     known_.high = gap_high_.data();
     known_.half_slot_rad = half_slot_rad_.data();
     known_.rings = lattice.rings;
+    if (options.threads == 2) second_ = std::make_unique<SecondThread>();
     known_.rings_per_mm = static_cast<float>(1.0 / lattice.spacing_mm);
     known_.spacing_mm = static_cast<float>(lattice.spacing_mm);
   }
@@ -66,24 +72,30 @@ class Clearance final : public Engine {
   }
 
   Removal step(PointVolume& volume, const BitPose& pose, RemovedSink removed) override {
-    Cutter cutter(tools_, volume, pose, removed);
-    const Sections sections(tools_.shape, pose, volume.lattice);
-    if (sections.isFlat()) {
-      for (int disc = sections.first(); disc <= sections.last(); ++disc) {
-        cutter.cut(disc, 0, volume.lattice.pointsPerDisc());
-      }
-      return cutter.finish();
-    }
+    const double slack_mm =
+        tools_.precision == Precision::Single ? singleError_mm(tools_.shape, sizeOf(volume, pose)) : 0;
+    const Sections sections(tools_.shape, pose, volume.lattice, slack_mm);
     known_.margin_mm = static_cast<float>(sections.margin_mm());
-    SectionLine line = sections.line();
-    for (int first = sections.first(); first <= sections.last(); first += kMostDiscs) {
-      std::array<Touched, kMostDiscs + 1> touched;
-      const int count =
-          findTouched(line, known_, first, std::min(kMostDiscs, sections.last() + 1 - first), touched.data());
-      for (int i = 0; i < count; ++i) visit(cutter, sections, touched[static_cast<std::size_t>(i)]);
-      line.along_0 -= static_cast<float>(kMostDiscs) * line.along_step;
-    }
-    return cutter.finish();
+    const int first = sections.first(), last = sections.last();
+    const auto cut = [&](int from, int to, RemovedSink sink) {
+      return cutDiscs(volume, pose, sections, from, to, sink);
+    };
+    if (!second_ || last - first < kLeastShared) return cut(first, last, removed);
+    // Words and vectors overlap between neighbouring discs, so some in the middle wait until both threads are done.
+    const int middle = first + (last - first) / 2;
+    const int apart = std::max(static_cast<int>(kPadding), 1 + static_cast<int>(64 / volume.lattice.pointsPerDisc()));
+    std::atomic_flag busy;
+    const auto in_turn = [&](std::span<const std::uint32_t> indices) {
+      while (busy.test_and_set(std::memory_order_acquire)) {
+      }
+      removed(indices);
+      busy.clear(std::memory_order_release);
+    };
+    Removal theirs, ours;
+    second_->run([&] { theirs = cut(middle + apart, last, in_turn); }, [&] { ours = cut(first, middle - 1, in_turn); });
+    theirs += ours;
+    theirs += cut(middle, std::min(last, middle + apart - 1), removed);
+    return theirs;
   }
 
  private:
@@ -92,6 +104,30 @@ class Clearance final : public Engine {
     Section section;
     float turn;  ///< the direction of the section's centre
   };
+
+  /// Steps discs first .. last.
+  Removal cutDiscs(PointVolume& volume, const BitPose& pose, const Sections& sections, int first, int last,
+                   RemovedSink removed) {
+    Cutter cutter(tools_, volume, pose, removed);
+    if (sections.isFlat()) {
+      for (int disc = first; disc <= last; ++disc) cutter.cut(disc, 0, volume.lattice.pointsPerDisc());
+      return cutter.finish();
+    }
+    for (; first <= last; first += kMostDiscs) {
+      std::array<Touched, kMostDiscs + 1> touched;
+      const int count =
+          findTouched(sections.line(first), known_, first, std::min(kMostDiscs, last + 1 - first), touched.data());
+      for (int i = 0; i < count; ++i) visit(cutter, sections, touched[static_cast<std::size_t>(i)]);
+    }
+    return cutter.finish();
+  }
+
+  /// How far points and tips may be from the path frame's origin.
+  static double sizeOf(const PointVolume& volume, const BitPose& pose) {
+    const Lattice& lattice = volume.lattice;
+    const double end_mm = std::max(std::abs(lattice.discZ_mm(0)), std::abs(lattice.discZ_mm(lattice.discs - 1)));
+    return std::max(norm(pose.tip_mm), end_mm + lattice.rings * lattice.spacing_mm);
+  }
 
   static std::size_t padded(int count) { return static_cast<std::size_t>(count) + kPadding; }
 
@@ -230,14 +266,15 @@ class Clearance final : public Engine {
   std::vector<std::uint16_t> first_ring_;
   std::vector<Slot> gap_low_, gap_high_;
   std::vector<float> half_slot_rad_;
+  std::unique_ptr<SecondThread> second_;
   Known<Slot> known_{};  ///< views of the vectors above
 };
 
 }  // namespace
 
-std::unique_ptr<Engine> makeClearance(const Lattice& lattice, const plan::Bit& bit) {
-  if (Lattice::slotsOf(lattice.rings) < 256) return std::make_unique<Clearance<std::uint8_t>>(lattice, bit);
-  return std::make_unique<Clearance<std::uint16_t>>(lattice, bit);
+std::unique_ptr<Engine> makeClearance(const Lattice& lattice, const plan::Bit& bit, const EngineOptions& options) {
+  if (Lattice::slotsOf(lattice.rings) < 256) return std::make_unique<Clearance<std::uint8_t>>(lattice, bit, options);
+  return std::make_unique<Clearance<std::uint16_t>>(lattice, bit, options);
 }
 
 }  // namespace spinaltap::drill

@@ -13,10 +13,11 @@ namespace spinaltap::drill {
 
 /// The parts of an engine that do not change between cycles.
 struct Tools {
-  Tools(const point_volume::Lattice& lattice, const plan::Bit& bit)
-      : shape(shapeOf(bit)), table(point_volume::discTable(lattice)) {}
+  Tools(const point_volume::Lattice& lattice, const plan::Bit& bit, Precision precision_ = Precision::Double)
+      : precision(precision_), shape(shapeOf(bit)), table(point_volume::discTable(lattice)) {}
   [[nodiscard]] std::size_t bytes() const { return 2 * table.x_mm.size() * sizeof(double); }
 
+  Precision precision;
   BitShape shape;
   point_volume::DiscTable table;
 };
@@ -74,12 +75,18 @@ class Cutter {
 
   /// The bits of `bits` whose points are inside the bit.
   std::uint64_t insideOf(std::uint32_t word, std::uint64_t bits, std::uint32_t base, double z_mm) {
+    return tools_.precision == Precision::Double ? insideBy<double>(word, bits, base, z_mm)
+                                                 : insideBy<float>(word, bits, base, z_mm);
+  }
+
+  template <class T>
+  std::uint64_t insideBy(std::uint32_t word, std::uint64_t bits, std::uint32_t base, double z_mm) {
     std::uint64_t inside = 0;
     for (; bits != 0; bits &= bits - 1) {
       const std::uint32_t index = (word << 6) + static_cast<std::uint32_t>(__builtin_ctzll(bits));
       ++removal_.tested;
       const Vec3 point_mm{tools_.table.x_mm[index - base], tools_.table.y_mm[index - base], z_mm};
-      if (isInside(tools_.shape, pose_.tip_mm, pose_.axis, point_mm)) inside |= bits & (~bits + 1);
+      if (isInside<T>(tools_.shape, pose_.tip_mm, pose_.axis, point_mm)) inside |= bits & (~bits + 1);
     }
     return inside;
   }
@@ -129,9 +136,11 @@ class Cutter {
   std::array<std::uint32_t, 256> indices_;
 };
 
-[[nodiscard]] std::unique_ptr<Engine> makeReference(const point_volume::Lattice& lattice, const plan::Bit& bit);
+[[nodiscard]] std::unique_ptr<Engine> makeReference(const point_volume::Lattice& lattice, const plan::Bit& bit,
+                                                    Precision precision);
 [[nodiscard]] std::unique_ptr<Engine> makeReport(const point_volume::Lattice& lattice, const plan::Bit& bit);
 [[nodiscard]] std::unique_ptr<Engine> makeBounded(const point_volume::Lattice& lattice, const plan::Bit& bit);
-[[nodiscard]] std::unique_ptr<Engine> makeClearance(const point_volume::Lattice& lattice, const plan::Bit& bit);
+[[nodiscard]] std::unique_ptr<Engine> makeClearance(const point_volume::Lattice& lattice, const plan::Bit& bit,
+                                                    const EngineOptions& options);
 
 }  // namespace spinaltap::drill

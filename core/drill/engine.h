@@ -62,13 +62,25 @@ class Engine {
   Engine() = default;
 };
 
+/// The predicate's arithmetic. Single is there to be compared with (predicate.h has its error): the same bits on every
+/// target as well, but not those of Double, and a ring exactly as wide as the bit may be torn.
+enum class Precision : std::uint8_t { Double, Single };
+
+struct EngineOptions {
+  Precision precision = Precision::Double;
+  /// 2: a second thread takes half of the discs, and stays awake (it spins) while steps come fast. The same set, sums
+  /// and hashes; the sink is called from either thread, never from both at a time.
+  int threads = 1;
+};
+
 /// `reference`: every alive point, every cycle; the truth for all others.
 /// `report`:    the 2002 algorithm as published; the rival in benchmarks.
 /// `bounded`:   as reference, but only on the discs, rings and slots that the bit can reach.
 /// `clearance`: as bounded, but only where the bit can have come nearer to bone than was known; what the program uses.
-/// @error NotFound, naming the engines there are.
+/// @error NotFound, naming the engines there are; Unsupported: single precision but for `reference` and `clearance`,
+///        two threads but for `clearance`, more than two.
 [[nodiscard]] Result<std::unique_ptr<Engine>> makeEngine(std::string_view name, const point_volume::PointVolume& volume,
-                                                         const plan::Bit& bit);
+                                                         const plan::Bit& bit, const EngineOptions& options = {});
 
 [[nodiscard]] std::vector<std::string_view> engineNames();
 

@@ -6,7 +6,8 @@ namespace {
 
 class Reference final : public Engine {
  public:
-  Reference(const point_volume::Lattice& lattice, const plan::Bit& bit) : tools_(lattice, bit) {}
+  Reference(const point_volume::Lattice& lattice, const plan::Bit& bit, Precision precision)
+      : tools_(lattice, bit, precision) {}
 
   using Engine::step;
   [[nodiscard]] std::string_view name() const override { return "reference"; }
@@ -24,8 +25,8 @@ class Reference final : public Engine {
 
 }  // namespace
 
-std::unique_ptr<Engine> makeReference(const point_volume::Lattice& lattice, const plan::Bit& bit) {
-  return std::make_unique<Reference>(lattice, bit);
+std::unique_ptr<Engine> makeReference(const point_volume::Lattice& lattice, const plan::Bit& bit, Precision precision) {
+  return std::make_unique<Reference>(lattice, bit, precision);
 }
 
 }  // namespace spinaltap::drill

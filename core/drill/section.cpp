@@ -11,6 +11,10 @@ namespace {
 constexpr double kFlat = 0.5;       // |axis.z| below this (tilted beyond 60 degrees)
 constexpr double kBluntCone = 0.2;  // g below this: the cone is too blunt for the tilt, and is left to the predicate
 
+// What lies e off the bit's surface lies at most so many e off its section: e / g in the ellipse's radius, with upright
+// and k v below 1, and k v e / g in its centre.
+constexpr double kPlane = 2 / kBluntCone;
+
 /// floor or ceil of value, held inside 0 .. limit before it becomes an integer.
 int heldFloor(double value, int limit) {
   return static_cast<int>(std::floor(std::min(std::max(value, -1.0), static_cast<double>(limit))));
@@ -21,19 +25,19 @@ int heldCeil(double value, int limit) {
 
 }  // namespace
 
-Sections::Sections(const BitShape& bit, const BitPose& pose, const point_volume::Lattice& lattice)
-    : bit_(bit), lattice_(lattice), tip_mm_(pose.tip_mm), axis_(pose.axis) {
+Sections::Sections(const BitShape& bit, const BitPose& pose, const point_volume::Lattice& lattice, double slack_mm)
+    : bit_(bit), lattice_(lattice), tip_mm_(pose.tip_mm), axis_(pose.axis), touch_mm_(kMargin_mm + kPlane * slack_mm) {
   const double outermost = static_cast<double>(lattice.rings - 1) * lattice.spacing_mm;
   const double beside = std::sqrt(tip_mm_.x * tip_mm_.x + tip_mm_.y * tip_mm_.y);
-  if (beside > outermost + bit.length_mm + bit.radius_mm + kMargin_mm) return;
+  if (beside > outermost + bit.length_mm + bit.radius_mm + touch_mm_) return;
   const Span reach = reachAlongPath(bit, pose);
-  first_ = heldCeil(reach.low_mm / lattice.spacing_mm - lattice.first_disc, lattice.discs);
-  last_ = heldFloor(reach.high_mm / lattice.spacing_mm - lattice.first_disc, lattice.discs - 1);
+  first_ = heldCeil((reach.low_mm - slack_mm) / lattice.spacing_mm - lattice.first_disc, lattice.discs);
+  last_ = heldFloor((reach.high_mm + slack_mm) / lattice.spacing_mm - lattice.first_disc, lattice.discs - 1);
   upright_ = std::abs(axis_.z);
   flat_ = upright_ < kFlat;
   if (flat_) return;
   per_z_ = 1.0 / axis_.z;
-  shaft_outer_ = bit.radius_mm / upright_ + kMargin_mm;
+  shaft_outer_ = bit.radius_mm / upright_ + touch_mm_;
   lean_ = std::sqrt(axis_.x * axis_.x + axis_.y * axis_.y);
   // Singles have 24 bits: what is some mm away is known to a millionth of that, what is a bit's length away is, too.
   margin_mm_ = kMargin_mm + 1e-6 * (outermost + beside + bit.length_mm * (lean_ + bit.radius_per_cone));
@@ -54,11 +58,11 @@ Section Sections::at(int disc) const {
   const double per_along = in_cone ? 1.0 + cone_shift_ : 1.0;
   section.x_mm = tip_mm_.x - c * per_along * axis_.x;
   section.y_mm = tip_mm_.y - c * per_along * axis_.y;
-  section.outer_mm = in_cone ? cone_outer_ * c + kMargin_mm : shaft_outer_;
-  if (coned_ ? c < -kMargin_mm : c < -(shaft_outer_ * lean_ + kMargin_mm)) return {};
+  section.outer_mm = in_cone ? cone_outer_ * c + touch_mm_ : shaft_outer_;
+  if (coned_ ? c < -touch_mm_ : c < -(shaft_outer_ * lean_ + touch_mm_)) return {};
   // Inside: what the other body, the tip and the end leave of the circle.
   const double apart = std::abs(c) * cone_shift_ * lean_;
-  const double reach = (section.outer_mm + apart) * lean_ + kMargin_mm;
+  const double reach = (section.outer_mm + apart) * lean_ + touch_mm_;
   if (c + reach > bit_.length_mm) return section;
   if (coned_) {
     section.inner_mm =
@@ -66,22 +70,22 @@ Section Sections::at(int disc) const {
   } else if (c - reach > bit_.cone_mm) {
     section.inner_mm = bit_.radius_mm;
   }
-  section.inner_mm -= kMargin_mm;
+  section.inner_mm -= touch_mm_;
   return section;
 }
 
-SectionLine Sections::line() const {
+SectionLine Sections::line(int first) const {
   const auto f = [](double value) { return static_cast<float>(value); };
   SectionLine line{};
-  line.along_0 = f(along(first_));
+  line.along_0 = f(along(first));
   line.along_step = f(lattice_.spacing_mm * per_z_);
   line.tip_x = f(tip_mm_.x), line.tip_y = f(tip_mm_.y);
   line.shaft_x = f(axis_.x), line.shaft_y = f(axis_.y);
   line.cone_x = f((1.0 + cone_shift_) * axis_.x), line.cone_y = f((1.0 + cone_shift_) * axis_.y);
   line.shaft_radius = f(shaft_outer_ + margin_mm_);
   line.cone_slope = f(coned_ ? cone_outer_ : 0.0);
-  line.cone_offset = coned_ ? f(kMargin_mm + margin_mm_) : line.shaft_radius;
-  line.first_along = f(coned_ ? -2.0 * kMargin_mm : -(line.shaft_radius * lean_ + 2.0 * kMargin_mm));
+  line.cone_offset = coned_ ? f(touch_mm_ + margin_mm_) : line.shaft_radius;
+  line.first_along = f(coned_ ? -2.0 * touch_mm_ : -(line.shaft_radius * lean_ + 2.0 * touch_mm_));
   return line;
 }
 

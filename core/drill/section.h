@@ -36,8 +36,8 @@ struct SectionLine {
 
 class Sections {
  public:
-  /// @pre as Engine::step.
-  Sections(const BitShape& bit, const BitPose& pose, const point_volume::Lattice& lattice);
+  /// Circles that also hold what a predicate takes that may be wrong by `slack_mm`. @pre as Engine::step.
+  Sections(const BitShape& bit, const BitPose& pose, const point_volume::Lattice& lattice, double slack_mm = 0);
 
   /// The discs that the bit can touch: first .. last, empty when first > last.
   [[nodiscard]] int first() const { return first_; }
@@ -47,8 +47,8 @@ class Sections {
 
   /// @pre !isFlat(), first() <= disc <= last().
   [[nodiscard]] Section at(int disc) const;
-  /// The same outer circles, disc first() being number 0; by at most 2 * margin_mm() wider.
-  [[nodiscard]] SectionLine line() const;
+  /// The same outer circles, disc `first` being number 0; by at most 2 * margin_mm() wider.
+  [[nodiscard]] SectionLine line(int first) const;
   /// What single precision and the predicate's touch can amount to.
   [[nodiscard]] double margin_mm() const { return margin_mm_; }
 
@@ -61,6 +61,7 @@ class Sections {
   int first_ = 0, last_ = -1;
   bool flat_ = true, coned_ = false;
   double upright_ = 0, lean_ = 0, per_z_ = 0, shaft_outer_ = 0, margin_mm_ = 0;
+  double touch_mm_ = 0;                                      ///< what the predicate and doubles can amount to
   double cone_outer_ = 0, cone_inner_ = 0, cone_shift_ = 0;  ///< per mm along
 };
 

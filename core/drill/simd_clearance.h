@@ -11,7 +11,7 @@
 namespace spinaltap::drill {
 
 /// Arrays are read up to so many elements past their last.
-inline constexpr std::size_t kPadding = 64;
+inline constexpr std::size_t kPadding = 16;
 
 /// What is known of where no alive point is; true for good, since points only die.
 template <class Slot>

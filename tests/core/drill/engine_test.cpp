@@ -108,7 +108,22 @@ PointVolume randomVolume(Random& random, const Lattice& lattice) {
   return volume;
 }
 
-class Exact : public testing::TestWithParam<const char*> {};
+struct Kind {
+  const char* label;
+  const char* engine;
+  EngineOptions options;
+  std::uint64_t hands = 8;
+};
+
+class Exact : public testing::TestWithParam<Kind> {
+ protected:
+  static std::unique_ptr<Engine> reference(const PointVolume& volume, const plan::Bit& bit) {
+    return *makeEngine("reference", volume, bit, {GetParam().options.precision, 1});
+  }
+  static std::unique_ptr<Engine> engine(const PointVolume& volume, const plan::Bit& bit) {
+    return *makeEngine(GetParam().engine, volume, bit, GetParam().options);
+  }
+};
 
 TEST_P(Exact, RemovesWhatTheReferenceRemovesForAnyBitLatticeAndMotion) {
   std::uint64_t removed = 0, cycles = 0;
@@ -118,8 +133,7 @@ TEST_P(Exact, RemovesWhatTheReferenceRemovesForAnyBitLatticeAndMotion) {
     const plan::Bit bit = randomBit(random);
     PointVolume a = randomVolume(random, randomLattice(random));
     PointVolume b = a;
-    const auto reference = *makeEngine("reference", a, bit);
-    const auto engine = *makeEngine(GetParam(), b, bit);
+    const auto truth_engine = reference(a, bit), our_engine = engine(b, bit);
     BitPose pose = randomPose(random, a.lattice);
     for (int i = 0; i < 12; ++i, ++cycles) {
       if (random.below(3) == 0) {
@@ -127,8 +141,8 @@ TEST_P(Exact, RemovesWhatTheReferenceRemovesForAnyBitLatticeAndMotion) {
       } else {
         moveOn(random, pose);
       }
-      const Step truth = stepOf(*reference, a, pose);
-      const Step ours = stepOf(*engine, b, pose);
+      const Step truth = stepOf(*truth_engine, a, pose);
+      const Step ours = stepOf(*our_engine, b, pose);
       ASSERT_EQ(difference(a, b), "") << "cycle " << i;
       expectSame(ours, truth);
       if (HasFatalFailure()) return;
@@ -174,7 +188,7 @@ class Hand {
 
 TEST_P(Exact, RemovesWhatTheReferenceRemovesInEveryCycleOfAHand) {
   std::uint64_t removed = 0, reached = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+  for (std::uint64_t seed = 1; seed <= GetParam().hands; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(1000 + seed);
     plan::Bit bit = randomBit(random);
@@ -186,12 +200,11 @@ TEST_P(Exact, RemovesWhatTheReferenceRemovesInEveryCycleOfAHand) {
     lattice.discs = 2 + static_cast<int>(30000 / lattice.pointsPerDisc());
     PointVolume a = randomVolume(random, lattice);
     PointVolume b = a;
-    const auto reference = *makeEngine("reference", a, bit);
-    const auto engine = *makeEngine(GetParam(), b, bit);
+    const auto truth_engine = reference(a, bit), our_engine = engine(b, bit);
     Hand hand(random, lattice);
     for (int i = 0; i < 2000; ++i) {
       const BitPose pose = hand.next();
-      const Removal truth = reference->step(a, pose), ours = engine->step(b, pose);
+      const Removal truth = truth_engine->step(a, pose), ours = our_engine->step(b, pose);
       ASSERT_EQ(ours.count, truth.count) << "cycle " << i << ", " << difference(a, b);
       ASSERT_EQ(ours.hash_delta, truth.hash_delta) << "cycle " << i;
       ASSERT_EQ(ours.density_sum_mg_cm3, truth.density_sum_mg_cm3) << "cycle " << i;
@@ -199,12 +212,24 @@ TEST_P(Exact, RemovesWhatTheReferenceRemovesInEveryCycleOfAHand) {
     }
     ASSERT_EQ(a.alive, b.alive);
   }
-  EXPECT_GT(removed, 50000u);
-  EXPECT_GT(reached, 2000u);
+  EXPECT_GT(removed, 1000u * GetParam().hands);
+  EXPECT_GT(reached, 20u * GetParam().hands);
 }
 
-INSTANTIATE_TEST_SUITE_P(Engines, Exact, testing::Values("bounded", "clearance"),
-                         [](const auto& engine) { return std::string(engine.param); });
+INSTANTIATE_TEST_SUITE_P(Engines, Exact,
+                         testing::Values(Kind{"Bounded", "bounded", {}}, Kind{"Clearance", "clearance", {}, 40},
+                                         Kind{"ClearanceOnTwoThreads", "clearance", {Precision::Double, 2}},
+                                         Kind{"ClearanceInSingles", "clearance", {Precision::Single, 1}}),
+                         [](const auto& kind) { return std::string(kind.param.label); });
+
+TEST(Engines, SayWhichOptionsTheyHave) {
+  const PointVolume volume = *point_volume::solidVolume({0.1, 4, 4, 0}, 300);
+  const plan::Bit bit{1, 1, 5};
+  EXPECT_EQ(makeEngine("bounded", volume, bit, {Precision::Single, 1}).error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(makeEngine("reference", volume, bit, {Precision::Double, 2}).error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(makeEngine("clearance", volume, bit, {Precision::Double, 3}).error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(makeEngine("steam", volume, bit).error().code, ErrorCode::NotFound);
+}
 
 }  // namespace
 }  // namespace spinaltap::drill

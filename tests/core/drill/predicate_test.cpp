@@ -93,6 +93,31 @@ TEST(Predicate, AgreesWithLongDoubleWhereverTheTouchIsNotInQuestion) {
   EXPECT_LT(close, 10);
 }
 
+TEST(Predicate, InSinglesErrsNoFartherFromTheSurfaceThanItSays) {
+  Random random(12);
+  int wrong = 0;
+  for (int i = 0; i < 400000; ++i) {
+    const plan::Bit bit{random.uniform(0.5, 8), random.uniform(0.1, 20), random.uniform(20, 60)};
+    const Vec3 axis =
+        normalized(Vec3{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)} + Vec3{0, 0, 1e-3});
+    const Vec3 tip{random.uniform(-30, 30), random.uniform(-30, 30), random.uniform(-30, 30)};
+    // Close to the surface, at a random depth around it.
+    const double along = random.uniform(-1e-4, bit.length_mm + 1e-4);
+    const double radius =
+        std::min(bit.diameter_mm / 2, std::max(0.0, along) / bit.cone_length_mm * bit.diameter_mm / 2);
+    Vec3 side = cross(axis, Vec3{random.unit(), 1, 0.3});
+    side = side / norm(side) * std::max(0.0, radius + random.uniform(-1e-4, 1e-4));
+    const Vec3 point = tip - axis * along + side;
+    const BitShape shape = shapeOf(bit);
+    if (isInside<float>(shape, tip, axis, point) == isInside(shape, tip, axis, point)) continue;
+    ++wrong;
+    const double bound = singleError_mm(shape, std::max(norm(tip), norm(point)));
+    // The distance across the axis is the farthest that moving the surface by the bound can have changed.
+    ASSERT_LE(std::abs(static_cast<double>(excess(bit, tip, axis, point))), bound) << "case " << i;
+  }
+  EXPECT_GT(wrong, 1000);
+}
+
 /// How many points of a ring are gone from the first disc.
 int goneFromRing(const point_volume::PointVolume& volume, int ring) {
   int gone = 0;
