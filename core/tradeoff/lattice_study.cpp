@@ -247,16 +247,23 @@ double sweptPerCycle_mm3(const plan::Bit& bit, const Motion& motion) {
   return step * (bit.diameter_mm * (bit.length_mm - bit.cone_length_mm) + radius * bit.cone_length_mm);
 }
 
+Share rippleOf(std::span<const double> shares, double smoothing_cycles) {
+  std::vector<double> smoothed;
+  smoothed.reserve(shares.size());
+  double smooth = 1;  // what an even removal would have it be
+  for (const double share : shares) {
+    smooth += (share - smooth) / (1 + smoothing_cycles);
+    smoothed.push_back(smooth);
+  }
+  return shareOf(smoothed);
+}
+
 Share rippleOf(const std::vector<Vec3>& points, double point_mm3, const plan::Bit& bit, const Motion& motion,
                double smoothing_cycles) {
   const double share = point_mm3 / sweptPerCycle_mm3(bit, motion);
   std::vector<double> shares;
-  double smooth = 1;  // what an even removal would have it be
-  for (const std::uint32_t removed : removedPerCycle(points, bit, motion)) {
-    smooth += (removed * share - smooth) / (1 + smoothing_cycles);
-    shares.push_back(smooth);
-  }
-  return shareOf(shares);
+  for (const std::uint32_t removed : removedPerCycle(points, bit, motion)) shares.push_back(removed * share);
+  return rippleOf(shares, smoothing_cycles);
 }
 
 Lattice motionLattice() { return {0.1, 36, 80, 0}; }

@@ -4,6 +4,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -69,6 +70,10 @@ struct Motion {
 
 /// What the bit newly covers in a cycle: its section times a step along its axis; its silhouette times one sideways.
 [[nodiscard]] double sweptPerCycle_mm3(const plan::Bit& bit, const Motion& motion);
+
+/// Of values that should all be 1, one a cycle; with `smoothing_cycles`, after a low-pass of one pole that begins at 1.
+/// @pre at least one value.
+[[nodiscard]] Share rippleOf(std::span<const double> shares, double smoothing_cycles = 0);
 
 /// Points removed a cycle against the volume swept; with `smoothing_cycles`, after a low-pass of one pole, as thrust
 /// is.
