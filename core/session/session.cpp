@@ -55,15 +55,17 @@ Output Session::step(const Input& input, drill::RemovedSink removed) noexcept {
   const double axis_length = norm(input.axis);
   output.status = statusOf(input, axis_length);
   if (output.status == Status::Ok && cycle_ > 0 && input.t_us < last_t_us_) output.status = Status::RefusedTime;
-  if (output.status == Status::Ok && !sweep_.add({input.tip_mm, input.axis / axis_length}, input.spinning)) {
-    output.status = Status::RefusedBehind;
-  }
   if (output.status == Status::Ok) {
     drill::Removal removal;
-    for (int cuts = 0; cuts < kMostCuts; ++cuts) {
+    int cuts = 0;
+    const auto cut = [&] {
       const std::optional<drill::BitPose> pose = sweep_.next();
-      if (!pose) break;
-      removal += engine_->step(volume_, *pose, removed);
+      if (pose) removal += engine_->step(volume_, *pose, removed);
+      ++cuts;
+      return pose.has_value();
+    };
+    while (!sweep_.add({input.tip_mm, input.axis / axis_length}, input.spinning)) cut();
+    while (cuts < kMostCuts && cut()) {
     }
     output.behind = !sweep_.done();
     // The client's clock has no known origin, so the first cycle lasts no time; its mass waits for the second.

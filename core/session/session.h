@@ -27,7 +27,6 @@ enum class Status : std::uint8_t {
   RefusedNotFinite = 1,  ///< a component is NaN or infinite, or beyond 1e6 mm
   RefusedAxis = 2,       ///< the axis has no direction (length below 1e-6 or above 1e6)
   RefusedTime = 3,       ///< t_us fell
-  RefusedBehind = 4,     ///< too many poses wait: each moved farther than a cycle can cut
 };
 
 /// A refused input leaves the state untouched, gives zero thrust, and is not counted as a cycle.
@@ -48,7 +47,8 @@ struct Config {
 };
 
 /// A cycle cuts at no more than so many places (sweep.h): 3.2 mm of motion at a spacing of 0.1 mm. What is left waits
-/// for the next.
+/// for the next. Only while Sweep::kMostPoses poses wait, each of them farther away than that, a cycle goes on until
+/// one of them is done.
 inline constexpr int kMostCuts = 64;
 
 class Session {

@@ -82,7 +82,7 @@ Result<ServerMessage> readFeedback(ByteReader& in) {
   const std::uint8_t status = in.u8();
   m.cycle = in.u64(), m.removed_total = in.u64();
   m.thrust_N = in.f64(), m.depth_mm = in.f64(), m.state_hash = in.u64();
-  if (status > static_cast<std::uint8_t>(session::Status::RefusedBehind)) return corrupt(kWhat, 6, "unknown status");
+  if (status > static_cast<std::uint8_t>(session::Status::RefusedTime)) return corrupt(kWhat, 6, "unknown status");
   m.status = static_cast<session::Status>(status);
   return m;
 }

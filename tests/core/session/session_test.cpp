@@ -181,6 +181,38 @@ TEST(Session, GivesADefinedAnswerToAnyBitsFromAnyEngine) {
   }
 }
 
+TEST(Session, CutsAFarThrowInTheCyclesThatFollowAndLosesNothingOfIt) {
+  Session thrown = makeSession("clearance", 200), slow = makeSession("clearance", 200);
+  // 15 mm in a millisecond is 300 cuts of half a spacing, 64 of them a cycle.
+  Output output = thrown.step(pose(0, -1));
+  output = thrown.step(pose(1000, 14));
+  EXPECT_EQ(output.status, Status::Ok);
+  EXPECT_TRUE(output.behind);
+  EXPECT_EQ(output.depth_mm, 14);  // where the hand is
+  int cycles = 1;
+  for (std::uint64_t t = 2000; output.behind; t += 1000, ++cycles) output = thrown.step(pose(t, 14));
+  EXPECT_EQ(cycles, 5);
+  for (int i = 0; i <= 1500; ++i) output = slow.step(pose(static_cast<std::uint64_t>(i) * 1000, -1 + 0.01 * i));
+  EXPECT_FALSE(output.behind);
+  EXPECT_EQ(thrown.volume().alive, slow.volume().alive);
+}
+
+TEST(Session, TakesEveryPoseHoweverFastTheyCome) {
+  Session session = makeSession();
+  std::uint64_t t = 0;
+  Output output;
+  for (; t < 1500; ++t) {  // to and fro through the volume, all the time: 120 cuts a pose
+    output = session.step(pose(t, t % 2 == 0 ? -1 : 5));
+    ASSERT_EQ(output.status, Status::Ok);
+    ASSERT_EQ(output.cycle, t + 1);
+  }
+  EXPECT_TRUE(output.behind);
+  int cycles = 0;
+  for (; output.behind; ++cycles) output = session.step(pose(t++, 5));
+  EXPECT_GT(cycles, 100);
+  EXPECT_LE(cycles, 256 * 120 / kMostCuts);  // as many as wait, with as many cuts as a pose has
+}
+
 TEST(Session, GoesOnAlikeAfterItIsMoved) {
   Session stays = makeSession();
   Session first = makeSession();
