@@ -141,7 +141,7 @@ TEST(Predicate, TakesARingExactlyAsWideAsTheBitWholeOrNotAtAll) {
         }
       }
       // A bit thinner by a ten-millionth of a millimetre leaves the ring whole.
-      const auto thin = *makeEngine("bounded", volume, {diameter - 1e-7, 5, 50});
+      const auto thin = *makeEngine("clearance", volume, {diameter - 1e-7, 5, 50});
       if (diameter - 1e-7 >= 0.5) thin->step(volume, {{0, 0, 6}, kUp});
       ASSERT_EQ(goneFromRing(volume, ring), 0);
     }
@@ -154,7 +154,7 @@ TEST(Predicate, TakesARingInTwoArcsWhenTheBitIsTilted) {
   auto volume = *point_volume::solidVolume(lattice, 300);
   const SinCos tilt = sinCos(70 * kPi / 180);
   const Vec3 axis{tilt.sin, 0, tilt.cos};
-  const auto engine = *makeEngine("bounded", volume, {3.0, 5.0, 60.0});
+  const auto engine = *makeEngine("clearance", volume, {3.0, 5.0, 60.0});
   engine->step(volume, {axis * 30.0, axis});
   int ends = 0;
   const int ring = 25, slots = Lattice::slotsOf(ring);
