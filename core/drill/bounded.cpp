@@ -19,6 +19,27 @@ int clampedCeil(double value, int limit) {
   return static_cast<int>(std::ceil(std::min(std::max(value, 0.0), static_cast<double>(limit))));
 }
 
+void cutRing(Cutter& cutter, int disc, int ring, const PolarCircle& section, double spacing_mm) {
+  const std::uint32_t start = Lattice::ringStart(ring);
+  if (ring == 0) return cutter.cut(disc, 0, 1);
+  const SlotRange range = slotsInside(section, ring, spacing_mm);
+  const int slots = Lattice::slotsOf(ring), end = range.first + range.count;
+  const auto at = [start](int slot) { return start + static_cast<std::uint32_t>(slot); };
+  if (end > slots) cutter.cut(disc, at(0), at(end - slots));
+  cutter.cut(disc, at(range.first), at(std::min(end, slots)));
+}
+
+void cutDisc(Cutter& cutter, const Lattice& lattice, int disc, const PolarCircle& section) {
+  const double spacing = lattice.spacing_mm, d = section.distance_mm, radius = section.radius_mm;
+  const int outermost = lattice.rings - 1;
+  // Rings wholly inside the circle are one run of points.
+  const int whole = clampedFloor((radius - d) / spacing, outermost);
+  if (whole >= 0) cutter.cut(disc, 0, Lattice::ringStart(whole + 1));
+  const int first = std::max(whole + 1, clampedCeil((d - radius) / spacing, outermost + 1));
+  const int last = clampedFloor((d + radius) / spacing, outermost);
+  for (int ring = first; ring <= last; ++ring) cutRing(cutter, disc, ring, section, spacing);
+}
+
 class Bounded final : public Engine {
  public:
   Bounded(const Lattice& lattice, const plan::Bit& bit) : tools_(lattice, bit) {}
@@ -32,41 +53,24 @@ class Bounded final : public Engine {
     Cutter cutter(tools_, volume, pose, removed);
     const Span reach = reachAlongPath(tools_.shape, pose);
     const double first_disc = lattice.first_disc;
-    const int first = clampedCeil(reach.low_mm / lattice.spacing_mm - first_disc, lattice.discs);
-    const int last = clampedFloor(reach.high_mm / lattice.spacing_mm - first_disc, lattice.discs - 1);
-    for (int disc = first; disc <= last; ++disc) {
-      const Circle section = sectionCircle(tools_.shape, pose, lattice.discZ_mm(disc));
-      if (section.radius_mm >= 0) cutDisc(cutter, lattice, disc, polar(section));
-    }
+    cutReachable(cutter, tools_.shape, pose, clampedCeil(reach.low_mm / lattice.spacing_mm - first_disc, lattice.discs),
+                 clampedFloor(reach.high_mm / lattice.spacing_mm - first_disc, lattice.discs - 1));
     return cutter.finish();
   }
 
  private:
-  static void cutDisc(Cutter& cutter, const Lattice& lattice, int disc, const PolarCircle& section) {
-    const double spacing = lattice.spacing_mm, d = section.distance_mm, radius = section.radius_mm;
-    const int outermost = lattice.rings - 1;
-    // Rings wholly inside the circle are one run of points.
-    const int whole = clampedFloor((radius - d) / spacing, outermost);
-    if (whole >= 0) cutter.cut(disc, 0, Lattice::ringStart(whole + 1));
-    const int first = std::max(whole + 1, clampedCeil((d - radius) / spacing, outermost + 1));
-    const int last = clampedFloor((d + radius) / spacing, outermost);
-    for (int ring = first; ring <= last; ++ring) cutRing(cutter, disc, ring, section, spacing);
-  }
-
-  static void cutRing(Cutter& cutter, int disc, int ring, const PolarCircle& section, double spacing_mm) {
-    const std::uint32_t start = Lattice::ringStart(ring);
-    if (ring == 0) return cutter.cut(disc, 0, 1);
-    const SlotRange range = slotsInside(section, ring, spacing_mm);
-    const int slots = Lattice::slotsOf(ring), end = range.first + range.count;
-    const auto at = [start](int slot) { return start + static_cast<std::uint32_t>(slot); };
-    if (end > slots) cutter.cut(disc, at(0), at(end - slots));
-    cutter.cut(disc, at(range.first), at(std::min(end, slots)));
-  }
-
   Tools tools_;
 };
 
 }  // namespace
+
+void cutReachable(Cutter& cutter, const BitShape& bit, const BitPose& pose, int first, int last) {
+  const Lattice& lattice = cutter.volume().lattice;
+  for (int disc = first; disc <= last; ++disc) {
+    const Circle section = sectionCircle(bit, pose, lattice.discZ_mm(disc));
+    if (section.radius_mm >= 0) cutDisc(cutter, lattice, disc, polar(section));
+  }
+}
 
 std::unique_ptr<Engine> makeBounded(const point_volume::Lattice& lattice, const plan::Bit& bit) {
   return std::make_unique<Bounded>(lattice, bit);

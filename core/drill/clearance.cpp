@@ -110,7 +110,11 @@ class Clearance final : public Engine {
                    RemovedSink removed) {
     Cutter cutter(tools_, volume, pose, removed);
     if (sections.isFlat()) {
-      for (int disc = first; disc <= last; ++disc) cutter.cut(disc, 0, volume.lattice.pointsPerDisc());
+      if (tools_.precision == Precision::Double) {
+        cutReachable(cutter, tools_.shape, pose, first, last);
+      } else {  // the bounds there allow for doubles' rounding alone
+        for (int disc = first; disc <= last; ++disc) cutter.cut(disc, 0, volume.lattice.pointsPerDisc());
+      }
       return cutter.finish();
     }
     for (; first <= last; first += kMostDiscs) {

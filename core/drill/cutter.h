@@ -136,6 +136,9 @@ class Cutter {
   std::array<std::uint32_t, 256> indices_;
 };
 
+/// Cuts what the bit can reach on discs first .. last, whatever its pose (bounds.h). In double precision.
+void cutReachable(Cutter& cutter, const BitShape& bit, const BitPose& pose, int first, int last);
+
 [[nodiscard]] std::unique_ptr<Engine> makeReference(const point_volume::Lattice& lattice, const plan::Bit& bit,
                                                     Precision precision);
 [[nodiscard]] std::unique_ptr<Engine> makeReport(const point_volume::Lattice& lattice, const plan::Bit& bit);

@@ -18,7 +18,7 @@ namespace spinaltap::drill {
 class Sweep {
  public:
   static constexpr double kSurvival = 0.25;  ///< of a spacing
-  static constexpr std::size_t kMostPoses = 256;
+  static constexpr std::size_t kMostPoses = 46;  ///< as many cycles as the longest way through a lattice takes at 0.1 mm
 
   /// @pre both are valid.
   Sweep(const point_volume::Lattice& lattice, const plan::Bit& bit);

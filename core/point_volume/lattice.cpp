@@ -11,6 +11,7 @@ namespace {
 
 // Bounds that the drill's rounding margins rely on (core/drill/bounds.h).
 constexpr double kWidest_mm = 100, kLongest_mm = 1100;
+constexpr int kMostRings = 10000;  // slots are numbered in 16 bits there (core/drill/simd_clearance.h)
 
 int rounded(double value) { return static_cast<int>(std::floor(value + 0.5)); }
 
@@ -39,6 +40,7 @@ Result<void> checkLattice(const Lattice& lattice) {
   if (lattice.rings < 1 || lattice.discs < 1) {
     return fail(ErrorCode::InvalidArgument, "lattice: at least one ring and one disc are needed");
   }
+  if (lattice.rings > kMostRings) return fail(ErrorCode::Limit, "lattice: more than 10,000 rings");
   const double rings = lattice.rings, discs = lattice.discs, first = lattice.first_disc;
   if ((3 * rings * (rings - 1) + 1) * discs >= 0x1p31) {
     return fail(ErrorCode::Limit, "lattice: 2^31 points or more");

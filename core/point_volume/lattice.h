@@ -46,7 +46,7 @@ struct Lattice {
   friend bool operator==(const Lattice&, const Lattice&) = default;
 };
 
-/// @error InvalidArgument, NotFinite, Limit (2^31 points or more).
+/// @error InvalidArgument, NotFinite, Limit (2^31 points or more, more than 10,000 rings).
 [[nodiscard]] Result<void> checkLattice(const Lattice& lattice);
 
 /// The lattice of a path: rings = round(volume radius / spacing), discs = round((lead + length) / spacing).

@@ -50,7 +50,7 @@ TEST(Lattice, NumbersItsSitesWithoutGapsAndFindsEachOneAgain) {
 }
 
 TEST(Lattice, FindsSitesNearTheLimitOfItsIndices) {
-  const Lattice lattice{0.001, 26754, 1, 0};  // one disc of almost 2^31 points
+  const Lattice lattice{0.001, 9999, 7, 0};  // almost 2^31 points
   ASSERT_TRUE(checkLattice(lattice).has_value());
   for (std::uint32_t back = 1; back < 1000000; back += 997) {
     const auto index = static_cast<std::uint32_t>(lattice.points() - back);
@@ -67,6 +67,7 @@ TEST(Lattice, IsRefusedWhenEmptyHugeOrNotFinite) {
   EXPECT_EQ(checkLattice({-0.1, 1, 1, 0}).error().code, ErrorCode::InvalidArgument);
   EXPECT_EQ(checkLattice({0.1, 40, 460000, 0}).error().code, ErrorCode::Limit);
   EXPECT_EQ(checkLattice({0.1, 2147483647, 2147483647, 0}).error().code, ErrorCode::Limit);
+  EXPECT_EQ(checkLattice({0.001, 10001, 1, 0}).error().code, ErrorCode::Limit);
   EXPECT_EQ(checkLattice({0.1, 2, 10, 2147483647}).error().code, ErrorCode::InvalidArgument);
   EXPECT_EQ(checkLattice({0.1, 2, 10, -2147483647 - 1}).error().code, ErrorCode::InvalidArgument);
   EXPECT_EQ(checkLattice({std::numeric_limits<double>::quiet_NaN(), 2, 2, 0}).error().code, ErrorCode::NotFinite);
