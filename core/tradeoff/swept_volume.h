@@ -19,7 +19,7 @@ struct Reach {
 [[nodiscard]] Reach reachOf(const plan::Bit& bit, std::span<const drill::BitPose> poses, double top_mm);
 
 struct SweptOptions {
-  int columns = 1597;  ///< of one estimate; taken up to the next Fibonacci number
+  int columns = 4181;  ///< of one estimate; taken up to the next Fibonacci number
   int estimates = 8;   ///< each with its columns shifted at random; at least 2, whose spread gives the error
   std::uint64_t seed = 2002;
   unsigned threads = 0;  ///< 0: all; the same bits from any number

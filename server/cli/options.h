@@ -8,6 +8,7 @@
 #include "core/base/vec3.h"
 #include "core/plan/path.h"
 #include "core/surface/defaults.h"
+#include "server/jobs/drill_tradeoff_job.h"
 #include "server/jobs/plan_job.h"
 
 namespace spinaltap::cli {
@@ -57,6 +58,9 @@ struct TradeoffOptions {
   std::vector<std::string> methods, smoothings;
   double sample_spacing_mm = 0;  ///< 0: as reconstruct chooses
   int reduce = 1;
+  std::string scene = "hand";  ///< of the drill, as what follows
+  bool full = false;
+  jobs::DrillTradeoffJob drill;
 };
 
 struct PlanOptions {

@@ -140,26 +140,75 @@ void addFit(Program& program) {
   sub->add_option("--threads", o->threads, "At most so many; 0: all")->capture_default_str();
 }
 
-void addTradeoff(Program& program) {
-  auto o = std::make_shared<TradeoffOptions>();
-  CLI::App* sub =
-      add(program, "tradeoff", "Measure what accuracy costs: a table, charts and silhouettes", o, runTradeoff);
+/// `tradeoff --surface`.
+void addSurfaceTradeoff(CLI::App* sub, TradeoffOptions& o, CLI::Option* surface) {
   CLI::Option* phantom_case =
-      sub->add_option("CASE", o->case_id, "Case with a label (default: the phantom, whose truth is known)");
-  sub->add_flag("--surface", o->surface, "The surface: methods, smoothing, tolerance, reduction")->required();
-  sub->add_option("--method", o->methods, "Only these")->check(oneOf({"pixel", "normal", "subvoxel"}));
-  sub->add_option(
-      "--smoothing", o->smoothings,
-      "Each method with these (auto or mm) alone (default: the report's 0, 0.5 and 30, and ours in detail)");
-  sub->add_option("--sample-spacing", o->sample_spacing_mm, "Between boundary points, mm (default: by the voxels)")
-      ->check(CLI::PositiveNumber);
-  sub->add_option("--out", o->out, "Folder for the pictures (SVG)");
-  sub->add_option("--reduce", o->reduce, "The phantom's voxels this many times wider: a quick look")
+      sub->add_option("CASE", o.case_id, "Case with a label (default: the phantom, whose truth is known)");
+  phantom_case->needs(surface);
+  sub->add_option("--method", o.methods, "Only these")->check(oneOf({"pixel", "normal", "subvoxel"}))->needs(surface);
+  sub->add_option("--smoothing", o.smoothings,
+                  "Each method with these (auto or mm) alone (default: the report's 0, 0.5 and 30, and ours in detail)")
+      ->needs(surface);
+  sub->add_option("--sample-spacing", o.sample_spacing_mm, "Between boundary points, mm (default: by the voxels)")
+      ->check(CLI::PositiveNumber)
+      ->needs(surface);
+  sub->add_option("--out", o.out, "Folder for the pictures (SVG)")->needs(surface);
+  sub->add_option("--reduce", o.reduce, "The phantom's voxels this many times wider: a quick look")
       ->excludes(phantom_case)
+      ->needs(surface)
       ->check(CLI::Range(1, 8))
       ->capture_default_str();
-  sub->add_flag("--osteoporotic", o->osteoporotic, "The phantom with a thin shell")->excludes(phantom_case);
-  sub->add_option("--data", o->data, kDataHelp);
+  sub->add_flag("--osteoporotic", o.osteoporotic, "The phantom with a thin shell")
+      ->excludes(phantom_case)
+      ->needs(surface);
+  sub->add_option("--data", o.data, kDataHelp)->needs(surface);
+}
+
+/// `tradeoff` alone.
+void addDrillTradeoff(CLI::App* sub, TradeoffOptions& o, CLI::Option* surface) {
+  sub->add_option("--scene", o.scene, "The drill that is timed")
+      ->check(oneOf(session::sceneNames()))
+      ->excludes(surface)
+      ->capture_default_str();
+  sub->add_option("--spacing", o.drill.spacings_mm, "Of the points, mm: these, with commas")
+      ->delimiter(',')
+      ->check(CLI::Range(0.01, 1.0))
+      ->excludes(surface)
+      ->capture_default_str();
+  sub->add_option("--threads", o.drill.threads, "That share a cycle: these, with commas")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 2))
+      ->excludes(surface)
+      ->capture_default_str();
+  sub->add_option("--rate", o.drill.rate_hz, "Cycles a second that are wanted")
+      ->check(CLI::Range(1.0, 1e6))
+      ->excludes(surface)
+      ->capture_default_str();
+  sub->add_option("--headroom", o.drill.headroom, "How many times quicker a p99.9 cycle is to be")
+      ->check(CLI::Range(1.0, 1000.0))
+      ->excludes(surface)
+      ->capture_default_str();
+  CLI::Option* length = sub->add_option("--length", o.drill.length_mm, "Of the path that is drilled, mm")
+                            ->check(CLI::Range(7.0, session::kReportLength_mm))
+                            ->excludes(surface)
+                            ->capture_default_str();
+  sub->add_flag("--full", o.full, "All of the report's path, 37.8 mm")->excludes(surface)->excludes(length);
+  sub->add_option("--repeats", o.drill.repeats, "Each cycle counts with its fastest of so many runs")
+      ->check(CLI::Range(1, 100))
+      ->excludes(surface)
+      ->capture_default_str();
+  sub->add_option("--html", o.drill.html, "Write a page with charts here")->excludes(surface);
+}
+
+void addTradeoff(Program& program) {
+  auto o = std::make_shared<TradeoffOptions>();
+  CLI::App* sub = add(program, "tradeoff",
+                      "Measure what accuracy costs: of drilling, by spacing, precision and threads; or of the surface",
+                      o, runTradeoff);
+  CLI::Option* surface =
+      sub->add_flag("--surface", o->surface, "The surface instead: methods, smoothing, tolerance, reduction");
+  addDrillTradeoff(sub, *o, surface);
+  addSurfaceTradeoff(sub, *o, surface);
 }
 
 void addPlan(Program& program) {

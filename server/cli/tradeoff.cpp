@@ -1,9 +1,24 @@
 #include "server/cli/commands.h"
+#include "server/jobs/drill_tradeoff_job.h"
 #include "server/jobs/tradeoff_job.h"
 
 namespace spinaltap::cli {
+namespace {
 
-Result<Outcome> runTradeoff(const TradeoffOptions& options, ProgressBar& bar) {
+Result<Outcome> ofDrill(const TradeoffOptions& options, ProgressBar& bar) {
+  jobs::DrillTradeoffJob job = options.drill;
+  const auto scene = session::sceneNamed(options.scene);
+  if (!scene) return tl::unexpected(scene.error());
+  job.scene = *scene;
+  if (options.full) job.length_mm = session::kReportLength_mm;
+  auto figures = jobs::drillTradeoff(job, bar.callback());
+  if (!figures) return tl::unexpected(figures.error());
+  std::string table = jobs::drillTradeoffTable(*figures);
+  if (!job.html.empty()) table += job.html + "\n";
+  return Outcome{std::move(*figures), true, std::move(table)};
+}
+
+Result<Outcome> ofSurface(const TradeoffOptions& options, ProgressBar& bar) {
   jobs::TradeoffJob job;
   job.case_id = options.case_id;
   job.reduce = options.reduce;
@@ -31,6 +46,12 @@ Result<Outcome> runTradeoff(const TradeoffOptions& options, ProgressBar& bar) {
     for (const auto& file : (*figures)["files"]) table += options.out + "/" + file.get<std::string>() + "\n";
   }
   return Outcome{std::move(*figures), true, std::move(table)};
+}
+
+}  // namespace
+
+Result<Outcome> runTradeoff(const TradeoffOptions& options, ProgressBar& bar) {
+  return options.surface ? ofSurface(options, bar) : ofDrill(options, bar);
 }
 
 }  // namespace spinaltap::cli

@@ -10,6 +10,7 @@
 
 #include "server/jobs/case_files.h"
 #include "server/jobs/tradeoff_plots.h"
+#include "server/jobs/words.h"
 
 namespace spinaltap::jobs {
 namespace {
@@ -49,13 +50,6 @@ std::vector<tradeoff::Setting> settingsOf(const TradeoffJob& job) {
                            }),
             all.end());
   return all;
-}
-
-/// Four significant digits: more would pretend.
-double shortened(double value) {
-  if (value == 0 || !std::isfinite(value)) return value;
-  const double scale = std::pow(10, 3 - std::floor(std::log10(std::abs(value))));
-  return std::round(value * scale) / scale;
 }
 
 Figures distancesOf(const tradeoff::Distances& d) {

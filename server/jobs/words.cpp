@@ -1,6 +1,7 @@
 #include "server/jobs/words.h"
 
 #include <charconv>
+#include <cmath>
 
 namespace spinaltap::jobs {
 
@@ -19,6 +20,12 @@ std::optional<double> numberIn(std::string_view word) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc() || end != word.data() + word.size()) return {};
   return value;
+}
+
+double shortened(double value) {
+  if (value == 0 || !std::isfinite(value)) return value;
+  const double scale = std::pow(10, 3 - std::floor(std::log10(std::abs(value))));
+  return std::round(value * scale) / scale;
 }
 
 bool isHeader(std::string_view line) {

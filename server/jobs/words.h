@@ -15,6 +15,9 @@ inline constexpr std::string_view kSeparators = " \t\r,;";
 /// "1.5", "+2e-3", "nan", "inf". Empty when it is not a number, or too large for one.
 [[nodiscard]] std::optional<double> numberIn(std::string_view word);
 
+/// To four significant digits: more would pretend.
+[[nodiscard]] double shortened(double value);
+
 /// Calls use(line, its number from 1) for every line that holds something: empty ones and those that begin with # are
 /// skipped, and so is a first one that begins with a letter (a header). Stops at the first error and gives it back,
 /// with "NAME line N: " before its message; `name` is what the file is called.

@@ -110,7 +110,7 @@ void drawPoints(Svg& svg, const Panel& panel, const Axis& x, const Axis& y, cons
   for (const Series& s : series) {
     std::vector<Place> places;
     for (const Place& p : s.points) places.push_back({xOf(panel, x, p[0]), yOf(panel, y, p[1])});
-    if (s.joined && places.size() > 1) svg.polyline(places, {s.colour, 1.5, ""});
+    if (s.joined && places.size() > 1) svg.polyline(places, {s.colour, 1.5, s.dash});
     for (const Place& p : places) svg.circle(p, 4.5, s.colour, "white");
   }
   for (const Series& s : series) {

@@ -26,6 +26,7 @@ struct Series {
   std::vector<Place> points;        ///< in the axes' units
   std::vector<std::string> labels;  ///< one a point, or none
   bool joined = false;              ///< by a line, in the order given
+  std::string_view dash = {};       ///< of that line, as stroke-dasharray; empty: none
 };
 
 /// One panel of a page: where it lies, what it is about.

@@ -8,24 +8,6 @@
 namespace spinaltap::plots {
 namespace {
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else if (c == '"') {
-      out += "&quot;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
 /// Everything in one string.
 std::string all(std::initializer_list<std::string_view> parts) {
   std::string out;
@@ -55,6 +37,24 @@ std::string withoutZeros(std::string text) {
 }
 
 }  // namespace
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&') {
+      out += "&amp;";
+    } else if (c == '<') {
+      out += "&lt;";
+    } else if (c == '>') {
+      out += "&gt;";
+    } else if (c == '"') {
+      out += "&quot;";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
 
 std::string px(double value) {
   std::array<char, 40> buffer{};
@@ -128,9 +128,10 @@ void Svg::clipTo(const Place& corner, double width, double height) {
 
 void Svg::endClip() { body_ += "</g>\n"; }
 
-std::string Svg::str() const {
+std::string Svg::str(std::string_view label) const {
+  const std::string called = label.empty() ? "" : all({" role=\"img\" aria-label=\"", escaped(label), "\""});
   return all({"<svg xmlns=\"http://www.w3.org/2000/svg\"", size(width_, height_), " viewBox=\"0 0 ", px(width_), " ",
-              px(height_), "\" font-family=\"Helvetica, Arial, sans-serif\">\n",
+              px(height_), "\" font-family=\"Helvetica, Arial, sans-serif\"", called, ">\n",
               "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n", body_, "</svg>\n"});
 }
 

@@ -43,8 +43,8 @@ class Svg {
   void clipTo(const Place& corner, double width, double height);
   void endClip();
 
-  /// The whole document.
-  [[nodiscard]] std::string str() const;
+  /// The whole document. With a label it is one picture to whoever has a page read out, and that is what it is called.
+  [[nodiscard]] std::string str(std::string_view label = {}) const;
 
  private:
   double width_, height_;
@@ -52,6 +52,8 @@ class Svg {
   std::string body_;
 };
 
+/// For text and attributes of SVG and HTML.
+[[nodiscard]] std::string escaped(std::string_view text);
 /// At most two decimals, no trailing zeros.
 [[nodiscard]] std::string px(double value);
 /// For people: three significant digits, no needless zeros or exponents from 1e-4 to 1e6.

@@ -160,6 +160,32 @@ TEST_F(Figures, OfATradeoffAreRowsAndPictures) {
   }
 }
 
+TEST_F(Figures, OfTheDrillsTradeoffAreRowsARecommendationAndAPage) {
+  const Json figures = json({"tradeoff", "--spacing", "0.4,0.25", "--length", "7", "--repeats", "1", "--threads", "1,2",
+                             "--scene", "off", "--rate", "1", "--headroom", "1", "--html", path("drill.html")},
+                            "tradeoff, the drill");
+  ASSERT_EQ(figures["rows"].size(), 8U);
+  for (const Json& row : figures["rows"]) expectDocumented("tradeoff, the drill, a row", row);
+  // A second for a cycle: the finer one holds, first in double on one thread.
+  ASSERT_EQ(figures["recommended_row"], 4);
+  EXPECT_NE(figures["recommendation"].get<std::string>().find("0.25 mm in double precision on 1 thread"),
+            std::string::npos)
+      << figures["recommendation"];
+  // A cone of 5 mm and 2 mm of shaft, 3 mm wide.
+  const double hole = 3.14159265 * 1.5 * 1.5 * (5.0 / 3 + 2);
+  EXPECT_NEAR(figures["swept_mm3"].get<double>() / hole, 1, 1e-3);
+  EXPECT_GT(std::filesystem::file_size(path("drill.html")), 10'000U);
+}
+
+TEST_F(Figures, OfARateThatNothingHoldsSayThatNoneDoes) {
+  const Json figures = json({"tradeoff", "--spacing", "0.4", "--length", "7", "--repeats", "1", "--threads", "1",
+                             "--scene", "on", "--rate", "1e6", "--headroom", "1000"},
+                            "tradeoff, the drill");
+  EXPECT_FALSE(figures.contains("recommended_row"));
+  EXPECT_EQ(figures["recommendation"].get<std::string>().rfind("None of these holds 1e+06 cycles a second", 0), 0U)
+      << figures["recommendation"];
+}
+
 TEST_F(Figures, AreALineEachWithoutJson) {
   const auto finished = run({"version"});
   EXPECT_EQ(finished.out.rfind("version  ", 0), 0u) << finished.out;

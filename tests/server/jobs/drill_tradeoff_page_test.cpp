@@ -1,0 +1,148 @@
+// The page of the drill's trade-off, from made-up figures: a file that parses, holds every row, and needs nothing else.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <vector>
+
+#include "server/jobs/drill_tradeoff_job.h"
+#include "server/jobs/drill_tradeoff_page.h"
+
+namespace spinaltap::jobs {
+namespace {
+
+Figures made(bool holds) {
+  Figures figures{{"scene", "hand"},
+                  {"length_mm", 12},
+                  {"cycles", 12001},
+                  {"steady_cycles", 7001},
+                  {"repeats", 3},
+                  {"processor", "A <fast> & \"quiet\" one"},
+                  {"hardware_threads", 2},
+                  {"rate_hz", 1000.0},
+                  {"headroom", 4.0},
+                  {"budget_us", 250.0},
+                  {"swept_mm3", 79.1},
+                  {"swept_error_percent", 0.004},
+                  {"swept_cycle_mm3", 0.007},
+                  {"swept_cycle_error_percent", 2.0},
+                  {"centres", 4000},
+                  {"sums_s", 0.1},
+                  {"rows", Figures::array()},
+                  {"recommendation", "Take <this> & that."}};
+  for (const double spacing : {0.4, 0.1}) {
+    for (const char* precision : {"double", "single"}) {
+      for (const int threads : {1, 2}) {
+        const bool single = precision[0] == 's';
+        figures["rows"].push_back({{"spacing_mm", spacing},
+                                   {"precision", precision},
+                                   {"threads", threads},
+                                   {"points", 1000},
+                                   {"memory_mb", 0.01 / spacing},
+                                   {"bytes_per_point", 2.2},
+                                   {"build_s", 0.01},
+                                   {"median_us", (single ? 1.5 : 1.0) / spacing},
+                                   {"p999_us", (single ? 6.0 : 5.0) / spacing},
+                                   {"met_p999_us", 90.0},
+                                   {"cycles_per_s", 1234567.0},
+                                   {"cycles_per_s_p999", 43210.0},
+                                   {"median_ratio", 1.0},
+                                   {"p999_ratio", 1.0},
+                                   {"removed", 4711},
+                                   {"removed_mm3", 79.2},
+                                   {"removed_error_percent", 0.13},
+                                   {"cycle_error_percent", -0.02},
+                                   {"ripple_percent", 40.0},
+                                   {"ripple_smoothed_percent", 0.0},
+                                   {"differing", single ? 17 : 0},
+                                   {"differing_on", single ? 160 : 0}});
+      }
+    }
+  }
+  if (holds) figures["recommended_row"] = 4;
+  return figures;
+}
+
+/// Every element that is opened is closed, in order; gives the names that there are.
+std::multiset<std::string> elementsOf(const std::string& page) {
+  std::multiset<std::string> names;
+  std::vector<std::string> open;
+  const std::regex tag(R"(<(/?)([A-Za-z0-9]+)((?:\s+[A-Za-z0-9:-]+="[^"<]*")*)\s*(/?)>)");
+  std::string rest = page.substr(page.find('\n'));  // after the doctype
+  std::size_t tags = 0;
+  for (std::sregex_iterator at(rest.begin(), rest.end(), tag), end; at != end; ++at, ++tags) {
+    const std::string name = (*at)[2];
+    if ((*at)[1] == "/") {
+      EXPECT_FALSE(open.empty()) << name;
+      if (open.empty()) return names;
+      EXPECT_EQ(open.back(), name);
+      open.pop_back();
+      continue;
+    }
+    names.insert(name);
+    if ((*at)[4] != "/") open.push_back(name);
+  }
+  EXPECT_TRUE(open.empty()) << open.back();
+  EXPECT_EQ(tags, static_cast<std::size_t>(std::count(rest.begin(), rest.end(), '<'))) << "each < begins a tag";
+  const std::regex ampersand("&(?!(amp|lt|gt|quot);)");
+  EXPECT_FALSE(std::regex_search(rest, ampersand)) << "each & begins an entity";
+  return names;
+}
+
+TEST(DrillTradeoffPage, IsWellFormedAndNeedsNothingElse) {
+  for (const bool holds : {true, false}) {
+    const std::string page = drillTradeoffPage(made(holds));
+    const auto names = elementsOf(page);
+    EXPECT_EQ(names.count("svg"), 6U);
+    EXPECT_EQ(names.count("script") + names.count("link") + names.count("img"), 0U);
+    EXPECT_EQ(page.find("url("), std::string::npos);
+    EXPECT_EQ(std::regex_replace(page, std::regex("xmlns=\"[^\"]*\""), "").find("http"), std::string::npos);
+    EXPECT_NE(page.find("Take &lt;this&gt; &amp; that."), std::string::npos);
+    EXPECT_NE(page.find("A &lt;fast&gt; &amp; &quot;quiet&quot; one"), std::string::npos);
+    EXPECT_EQ(page.find("class=\"best\"") != std::string::npos, holds);
+  }
+}
+
+TEST(DrillTradeoffPage, HoldsEveryRowAndNamesItsCharts) {
+  const Figures figures = made(true);
+  const std::string page = drillTradeoffPage(figures);
+  for (const Figures& row : figures["rows"]) {
+    std::string cells;
+    for (const DrillColumn& column : drillColumns().subspan(1)) cells += "<td>" + drillCell(row, column) + "</td>";
+    EXPECT_NE(page.find(cells), std::string::npos) << cells;
+  }
+  const std::regex chart("<svg [^>]*role=\"img\" aria-label=\"[^\"]{20,}\"");
+  EXPECT_EQ(std::distance(std::sregex_iterator(page.begin(), page.end(), chart), std::sregex_iterator()), 6);
+  EXPECT_NE(page.find("tabindex=\"0\""), std::string::npos) << "a wide table scrolls by keyboard";
+  EXPECT_EQ(page.find("nan"), std::string::npos) << "the ripple that is 0 has no logarithm, and is left out";
+  EXPECT_NE(page.find("<td>1</td><td>1.5</td><td>1.2</td><td>17</td><td>160</td><td>4711</td>"), std::string::npos)
+      << "single over double: 1.5 times the median, 1.2 times the p99.9";
+}
+
+TEST(DrillTradeoffTable, HasALineARowAndTheRecommendation) {
+  const Figures figures = made(true);
+  const std::string table = drillTradeoffTable(figures);
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 1 + 8 + 1 + 1 + 1);
+  EXPECT_NE(table.find("+0.13"), std::string::npos) << "errors have their sign";
+  EXPECT_NE(table.find("1230000"), std::string::npos) << "three digits, no exponents";
+  EXPECT_NE(table.find("Take <this> & that.\n"), std::string::npos);
+}
+
+TEST(DrillTradeoff, RefusesWhatItCannotMeasureBeforeItRuns) {
+  DrillTradeoffJob job;
+  job.length_mm = 3;
+  EXPECT_FALSE(drillTradeoff(job, {}).has_value());
+  job = {}, job.spacings_mm = {};
+  EXPECT_FALSE(drillTradeoff(job, {}).has_value());
+  job = {}, job.spacings_mm = {0.1, 0.0001};
+  EXPECT_FALSE(drillTradeoff(job, {}).has_value());
+  job = {}, job.scene = session::Scene::On, job.length_mm = 37.8, job.spacings_mm = {0.1, 0.01};
+  const auto large = drillTradeoff(job, {});
+  ASSERT_FALSE(large.has_value());
+  EXPECT_EQ(large.error().code, ErrorCode::Limit);
+  EXPECT_NE(large.error().message.find("spacing 0.01 mm"), std::string::npos) << large.error().message;
+}
+
+}  // namespace
+}  // namespace spinaltap::jobs
