@@ -107,7 +107,11 @@ std::string adviceOn(const std::vector<DrillMeasured>& rows, const tradeoff::Wan
     const DrillMeasured& row = rows[*best];
     return "Recommended for " + asked + ": " + settingText(row) + ", whose p99.9 cycle takes " +
            shortNumber(row.p999_s * 1e6) + " us; " + shortNumber(static_cast<double>(row.bytes) * 1e-6) +
-           " MB, ripple " + shortNumber(100 * row.ripple) + " %.";
+           " MB, ripple " + shortNumber(100 * row.ripple) + " %." +
+           (row.met_p999_s * wanted.rate_hz > 1
+                ? " Other work on this machine made it " + shortNumber(row.met_p999_s * 1e6) +
+                      " us, longer than a whole cycle: it needs a quieter one, or fewer threads."
+                : std::string());
   }
   const auto quickest = std::min_element(
       rows.begin(), rows.end(), [](const DrillMeasured& a, const DrillMeasured& b) { return a.p999_s < b.p999_s; });
@@ -196,7 +200,7 @@ constexpr std::array kColumns{
     DrillColumn{"20 ms %", "ripple_smoothed_percent", "the same after smoothing over 20 ms"},
     DrillColumn{"differ", "differing", "points that end otherwise than in the first row of this spacing"},
     DrillColumn{"on", "differing_on",
-                "the same in the scene `on`, where a ring is exactly as wide as the bit, against double"}};
+                "the same against double in the scene on, where a ring is exactly as wide as the bit"}};
 
 }  // namespace
 

@@ -34,15 +34,15 @@ constexpr std::string_view kBudget = "#555";
 constexpr std::string_view kStyle = R"(
 :root { color-scheme: light dark; --ink: #1d2126; --soft: #555c64; --page: #fff; --line: #d5d9de; --mark: #e4f0fc; }
 body { margin: 0; background: var(--page); color: var(--ink); font: 16px/1.5 system-ui, Helvetica, Arial, sans-serif; }
-main { max-width: 78rem; margin: 0 auto; padding: 1.5rem; }
+main { max-width: 84rem; margin: 0 auto; padding: 1.5rem; }
 h1 { font-size: 1.6rem; margin: 0 0 .5rem; } h2 { font-size: 1.2rem; margin: 2rem 0 .5rem; }
 .advice { border-left: .3rem solid #1668b8; background: var(--mark); padding: .6rem 1rem; margin: 1rem 0; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 22rem), 1fr)); gap: 1.2rem; }
 figure { margin: 0; } figcaption { color: var(--soft); font-size: .9rem; } svg { width: 100%; height: auto; }
 .scroll { overflow-x: auto; } .scroll:focus-visible { outline: .15rem solid #1668b8; outline-offset: .15rem; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .85rem; }
 caption { text-align: left; color: var(--soft); padding-bottom: .4rem; }
-th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th, td { padding: .25rem .45rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 thead th { border-bottom: 2px solid var(--line); } tr.best { background: var(--mark); }
 dt { font-weight: 600; float: left; clear: left; width: 7rem; } dd { margin: 0 0 .2rem 7.5rem; }
 @media (prefers-color-scheme: dark) {
