@@ -56,7 +56,7 @@ class PlayerBinding {
   [[nodiscard]] val poseAt(double cycle) const {
     if (player_.cycles() == 0) return val::undefined();
     const std::uint64_t at = std::min(wholeOf(cycle), player_.cycles());
-    const recording::Moment& moment = player_.moment(std::max<std::uint64_t>(at, 1));
+    const recording::Moment moment = player_.moment(std::max<std::uint64_t>(at, 1));
     val pose = val::object();
     pose.set("t_us", static_cast<double>(moment.input.t_us));
     pose.set("tip", tripleOf(moment.input.tip_mm));
@@ -74,7 +74,7 @@ class PlayerBinding {
     const double point_mm3 = pointVolume_mm3(player_.before().lattice);
     std::vector<float> rows;
     for (std::uint64_t cycle = 1; cycle <= last; cycle = cycle < last ? std::min(cycle + step, last) : last + 1) {
-      const recording::Moment& moment = player_.moment(cycle);
+      const recording::Moment moment = player_.moment(cycle);
       const double t_s = static_cast<double>(moment.input.t_us - player_.moment(1).input.t_us) * 1e-6;
       for (const double v :
            {t_s, moment.depth_mm, moment.thrust_N, static_cast<double>(moment.removed_total) * point_mm3}) {
@@ -95,6 +95,11 @@ class PlayerBinding {
     result.set("cycles", static_cast<double>(report.cycles));
     result.set("hash", hexOf(report.state_hash));
     result.set("first_difference", static_cast<double>(report.first_difference));
+    val discs = val::array();
+    for (const std::uint32_t disc : report.discs) discs.call<void>("push", disc);
+    result.set("discs", discs);
+    result.set("comparable", report.comparable);
+    result.set("finding", recording::describe(report));
     return result;
   }
 

@@ -101,7 +101,8 @@ StepResult SessionBinding::step(double t_us, double tx, double ty, double tz, do
   const session::Output output = session_.step(
       input, [&](std::span<const std::uint32_t> some) { removed_.insert(removed_.end(), some.begin(), some.end()); });
   inputs_.push_back(input);
-  states_.push_back({output.cycle, output.state_hash});
+  states_.push_back({output.cycle, output.state_hash, output.removed_total});
+  removed_all_.insert(removed_all_.end(), removed_.begin(), removed_.end());
   if (output.status == session::Status::Ok) {
     const plan::Bit& bit = header_.config.bit;
     if (output.removed > 0) {
@@ -143,10 +144,16 @@ val SessionBinding::recordingBytes() const {
   };
   Result<recording::Writer> writer = recording::Writer::begin(header_, before, keep);
   if (!writer) return val::undefined();  // over 2^26 points: no browser holds that many
+  std::span<const std::uint32_t> left = removed_all_;
+  std::uint64_t removed_total = 0;
   for (std::size_t i = 0; i < inputs_.size(); ++i) {
     session::Output output;
     output.cycle = states_[i].cycle, output.state_hash = states_[i].state_hash;
-    (void)writer->append(inputs_[i], output);  // the sink cannot fail
+    const auto count = static_cast<std::size_t>(states_[i].removed_total - removed_total);
+    for (const std::uint32_t point : left.first(count)) before.alive[point >> 6] &= ~(1ull << (point & 63));
+    (void)writer->append(inputs_[i], output, left.first(count), before);  // the sink cannot fail
+    left = left.subspan(count);
+    removed_total = states_[i].removed_total;
   }
   (void)writer->finish();
   return bytesToArray(bytes);

@@ -48,8 +48,12 @@ class SessionBinding {
   splats::SplatTracker tracker_;
   metrics::Accumulator metrics_;
   std::vector<session::Input> inputs_;
-  std::vector<recording::Checkpoint> states_;  ///< after each input
-  std::vector<std::uint32_t> removed_;         ///< by the last step
+  struct State {
+    std::uint64_t cycle, state_hash, removed_total;
+  };
+  std::vector<State> states_;               ///< after each input
+  std::vector<std::uint32_t> removed_;      ///< by the last step
+  std::vector<std::uint32_t> removed_all_;  ///< in order
   std::vector<std::uint32_t> taken_indices_;
 };
 

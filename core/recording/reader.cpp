@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "core/recording/format.h"
+#include "core/recording/input_code.h"
 #include "core/recording/recording.h"
 
 namespace spinaltap::recording {
@@ -20,7 +21,8 @@ struct Chunk {
 /// The chunks, in order, each checked against the chain.
 class ChunkReader {
  public:
-  explicit ChunkReader(std::span<const std::byte> bytes) : bytes_(bytes), at_(8) {}
+  ChunkReader(std::span<const std::byte> bytes, std::uint32_t version)
+      : bytes_(bytes), at_(8), previous_(preambleOf(version)) {}
 
   /// Nothing when the file ends inside the chunk, or just before it.
   Result<std::optional<Chunk>> next() {
@@ -47,7 +49,7 @@ class ChunkReader {
  private:
   std::span<const std::byte> bytes_;
   std::size_t at_;
-  std::uint64_t previous_ = kPreamble;
+  std::uint64_t previous_;
 };
 
 template <class T>
@@ -105,10 +107,10 @@ Result<point_volume::PointVolume> readVolume(const Chunk& chunk) {
   return volume;
 }
 
-Result<void> readInputs(const Chunk& chunk, Recording& recording) {
+Result<void> readPlainInputs(const Chunk& chunk, Recording& recording) {
   wire::ByteReader in(chunk.payload);
   const std::uint32_t count = in.u32();
-  if (count == 0 || in.left() != std::uint64_t{count} * kBytesPerInput + 16) {
+  if (count == 0 || in.left() != std::uint64_t{count} * kBytesPerPlainInput + 16) {
     return corrupt(chunk.payload_offset, "inputs of the wrong length");
   }
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -120,7 +122,42 @@ Result<void> readInputs(const Chunk& chunk, Recording& recording) {
     recording.inputs.push_back(input);
   }
   const std::uint64_t cycle = in.u64();
-  recording.checkpoints.push_back({cycle, in.u64()});
+  recording.checkpoints.push_back({cycle, in.u64(), recording.inputs.size(), {}});
+  return {};
+}
+
+bool readDiscs(wire::ByteReader& in, int discs, std::vector<DiscSum>& sums) {
+  const std::uint64_t count = takeVarint(in), all = static_cast<std::uint64_t>(discs);
+  if (count > all) return false;
+  std::uint64_t next = 0;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const std::uint64_t gap = takeVarint(in);
+    if (gap >= all - next) return false;
+    sums.push_back({static_cast<std::uint32_t>(next + gap), in.u32()});
+    next += gap + 1;
+  }
+  return !in.failed();
+}
+
+Result<void> readCodedInputs(const Chunk& chunk, Recording& recording) {
+  wire::ByteReader in(chunk.payload);
+  const std::uint32_t count = in.u32();
+  if (in.failed() || count == 0 || count > kInputsPerChunk) {
+    return corrupt(chunk.payload_offset, "no inputs, or too many");
+  }
+  Checkpoint checkpoint;
+  checkpoint.cycle = in.u64(), checkpoint.state_hash = in.u64();
+  if (!readDiscs(in, recording.volume.lattice.discs, checkpoint.discs)) {
+    return corrupt(chunk.payload_offset + in.offset(), "discs that there are not");
+  }
+  const std::vector<std::uint16_t> checks = in.array<std::uint16_t>(count);
+  const std::size_t code_at = chunk.payload_offset + in.offset();
+  if (in.failed() || !decodeInputs(in.raw(in.left()), count, recording.inputs)) {
+    return corrupt(code_at, "inputs in no known code");
+  }
+  recording.checks.insert(recording.checks.end(), checks.begin(), checks.end());
+  checkpoint.inputs = recording.inputs.size();
+  recording.checkpoints.push_back(std::move(checkpoint));
   return {};
 }
 
@@ -132,7 +169,8 @@ Result<void> readRest(ChunkReader& chunks, Recording& recording) {
     if (!*chunk) return {};
     const Chunk& found = **chunk;
     if (found.kind == Kind::Inputs) {
-      if (auto ok = readInputs(found, recording); !ok) return ok;
+      const auto read = recording.version == 1 ? readPlainInputs(found, recording) : readCodedInputs(found, recording);
+      if (!read) return read;
       continue;
     }
     if (found.kind != Kind::End) return corrupt(found.payload_offset, "a chunk out of its place");
@@ -162,14 +200,17 @@ Result<Recording> read(std::span<const std::byte> bytes) {
   const std::uint32_t magic = in.u32(), version = in.u32();
   if (in.failed()) return corrupt(bytes.size(), "cut before its point volume was whole,");
   if (magic != kMagic) return corrupt(0, "wrong magic number");
-  if (version != kVersion) return fail(ErrorCode::Unsupported, "recording: version " + std::to_string(version));
-  ChunkReader chunks(bytes);
+  if (version < kOldestVersion || version > kVersion) {
+    return fail(ErrorCode::Unsupported, "recording: version " + std::to_string(version));
+  }
+  ChunkReader chunks(bytes, version);
   const Result<Chunk> header_chunk = expect(chunks, Kind::Header);
   if (!header_chunk) return tl::unexpected(header_chunk.error());
   const Result<Chunk> volume_chunk = expect(chunks, Kind::Volume);
   if (!volume_chunk) return tl::unexpected(volume_chunk.error());
 
   Recording recording;
+  recording.version = version;
   Result<Header> header = readHeader(*header_chunk);
   if (!header) return tl::unexpected(header.error());
   recording.header = std::move(*header);
@@ -177,6 +218,7 @@ Result<Recording> read(std::span<const std::byte> bytes) {
   if (!volume) return tl::unexpected(volume.error());
   recording.volume = std::move(*volume);
   if (auto ok = readRest(chunks, recording); !ok) return tl::unexpected(ok.error());
+  recording.inputs.shrink_to_fit();  // of a long drill, tens of megabytes
   return recording;
 }
 

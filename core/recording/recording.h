@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/base/result.h"
+#include "core/recording/disc_sums.h"
 #include "core/session/session.h"
 
 namespace spinaltap::recording {
@@ -26,12 +27,16 @@ struct Header {
 struct Checkpoint {
   std::uint64_t cycle = 0;  ///< 1-based, as session::Output::cycle
   std::uint64_t state_hash = 0;
+  std::uint64_t inputs = 0;    ///< how many led here, refused ones included
+  std::vector<DiscSum> discs;  ///< what was removed since the checkpoint before; none in version 1
 };
 
 struct Recording {
+  std::uint32_t version = 2;  ///< of the format
   Header header;
   point_volume::PointVolume volume;    ///< as it was before the first input
   std::vector<session::Input> inputs;  ///< as they arrived, refused ones included
+  std::vector<std::uint16_t> checks;   ///< the low bits of the state hash after each input; none in version 1
   std::vector<Checkpoint> checkpoints;
   bool complete = false;  ///< false when the tail was cut off: everything up to the cut is here
 };
@@ -48,8 +53,10 @@ class Writer {
   Writer& operator=(Writer&&) noexcept;
   ~Writer();
 
-  /// Buffers; writes a chunk every 1000 inputs. @error Io; from then on nothing more is written, and every call fails.
-  [[nodiscard]] Result<void> append(const session::Input& input, const session::Output& output);
+  /// Buffers; writes a chunk every 1000 inputs. `removed` are the points that the step removed, `volume` is the
+  /// session's after it. @error Io; from then on nothing more is written, and every call fails.
+  [[nodiscard]] Result<void> append(const session::Input& input, const session::Output& output,
+                                    std::span<const std::uint32_t> removed, const point_volume::PointVolume& volume);
   /// Writes what is buffered, so that it survives a crash. @error Io.
   [[nodiscard]] Result<void> flush();
   /// The last chunk and the end mark. @error Io.
@@ -61,17 +68,27 @@ class Writer {
   std::unique_ptr<State> state_;
 };
 
-/// @error Corrupt (naming the offset), Unsupported (another version), Limit. A cut tail is no error: complete = false,
-/// with
+/// Reads versions 1 and 2. @error Corrupt (naming the offset), Unsupported (another version), Limit. A cut tail is no
+/// error: complete = false, with
 ///        everything before the cut; but when not even the point volume is whole there is nothing to replay: Corrupt.
 [[nodiscard]] Result<Recording> read(std::span<const std::byte> bytes);
 
 struct ReplayReport {
   bool verified = false;  ///< every checkpoint met, and at least one
+  /// False: version 1, and its hashes differ. Cores before 0.2 hashed otherwise, so that says nothing about the drill.
+  bool comparable = true;
   std::uint64_t cycles = 0;
-  std::uint64_t state_hash = 0;        ///< after the last input
-  std::uint64_t first_difference = 0;  ///< cycle of the first checkpoint that differs; 0 when none does
+  std::uint64_t state_hash = 0;  ///< after the last input
+  /// The first cycle after which the states differ; 0 when none does. (One wrong state in 2^16 passes for right, and
+  /// then it is a later one. Version 1: the cycle of the first checkpoint that differs.)
+  std::uint64_t first_difference = 0;
+  /// The discs on which, from there to the first checkpoint that shows any, other points were removed, or the same at
+  /// other cycles, with other densities or beside others. None when force or time alone differ, and in version 1.
+  std::vector<std::uint32_t> discs;
 };
+
+/// One line for people: verified, or the cycle and the discs that differ first, or why nothing can be said.
+[[nodiscard]] std::string describe(const ReplayReport& report);
 
 /// each(input, output, removed), refused inputs included; the indices removed are valid during the call.
 using Observer =

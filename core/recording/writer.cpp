@@ -1,7 +1,10 @@
+#include <algorithm>
 #include <cassert>
 #include <utility>
 
+#include "core/recording/disc_sums.h"
 #include "core/recording/format.h"
+#include "core/recording/input_code.h"
 #include "core/recording/recording.h"
 
 namespace spinaltap::recording {
@@ -64,9 +67,11 @@ std::vector<std::byte> volumePayload(const point_volume::PointVolume& volume) {
 
 struct Writer::State {
   Sink sink;
-  std::uint64_t previous = kPreamble;
-  wire::ByteWriter inputs;
-  std::uint32_t buffered = 0;
+  std::uint64_t previous = preambleOf(kVersion);
+  std::vector<session::Input> inputs;  ///< a few that are written, to code the others from; then those that wait
+  std::size_t written = 0;             ///< of `inputs`
+  std::vector<std::uint16_t> checks;   ///< of those that wait
+  DiscSums removed;
   std::uint64_t total = 0;
   Checkpoint checkpoint;
   bool failed = false, finished = false;
@@ -91,14 +96,29 @@ struct Writer::State {
   }
 
   Result<void> putInputs() {
-    if (buffered == 0) return {};
+    if (checks.empty()) return {};
     wire::ByteWriter out;
-    out.u32(buffered);
-    out.raw(inputs.bytes());
+    out.u32(static_cast<std::uint32_t>(checks.size()));
     out.u64(checkpoint.cycle), out.u64(checkpoint.state_hash);
-    inputs.clear();
-    buffered = 0;
+    putDiscs(removed.take(), out);
+    out.array(std::span<const std::uint16_t>(checks));
+    const std::span<const session::Input> all(inputs);
+    encodeInputs(all.first(written), all.subspan(written), out);
+    const std::size_t needless = inputs.size() - std::min(inputs.size(), kCodeMemory);
+    inputs.erase(inputs.begin(), inputs.begin() + static_cast<std::ptrdiff_t>(needless));
+    written = inputs.size();
+    checks.clear();
     return putChunk(Kind::Inputs, out.bytes());
+  }
+
+  static void putDiscs(const std::vector<DiscSum>& discs, wire::ByteWriter& out) {
+    putVarint(out, static_cast<std::uint32_t>(discs.size()));
+    std::uint32_t next = 0;
+    for (const DiscSum& disc : discs) {
+      putVarint(out, disc.disc - next);
+      out.u32(disc.sum);
+      next = disc.disc + 1;
+    }
   }
 };
 
@@ -115,21 +135,24 @@ Result<Writer> Writer::begin(const Header& header, const point_volume::PointVolu
   auto state = std::make_unique<State>();
   state->sink = std::move(sink);
   wire::ByteWriter preamble;
-  preamble.u64(kPreamble);
+  preamble.u64(preambleOf(kVersion));
   if (auto ok = state->put(preamble.bytes()); !ok) return tl::unexpected(ok.error());
   if (auto ok = state->putChunk(Kind::Header, headerPayload(header)); !ok) return tl::unexpected(ok.error());
   if (auto ok = state->putChunk(Kind::Volume, volumePayload(volume)); !ok) return tl::unexpected(ok.error());
   return Writer(std::move(state));
 }
 
-Result<void> Writer::append(const session::Input& input, const session::Output& output) {
-  assert(!state_->finished);
-  wire::ByteWriter& out = state_->inputs;
-  out.u64(input.t_us), out.vec3(input.tip_mm), out.vec3(input.axis), out.u8(input.spinning ? 1 : 0);
-  state_->checkpoint = {output.cycle, output.state_hash};
-  ++state_->buffered, ++state_->total;
-  if (state_->buffered < kInputsPerChunk) return {};
-  return state_->putInputs();
+Result<void> Writer::append(const session::Input& input, const session::Output& output,
+                            std::span<const std::uint32_t> removed, const point_volume::PointVolume& volume) {
+  State& state = *state_;
+  assert(!state.finished);
+  state.inputs.push_back(input);
+  state.checks.push_back(static_cast<std::uint16_t>(output.state_hash));
+  state.removed.add(removed, output.cycle, volume);
+  state.checkpoint.cycle = output.cycle, state.checkpoint.state_hash = output.state_hash;
+  ++state.total;
+  if (state.checks.size() < kInputsPerChunk) return {};
+  return state.putInputs();
 }
 
 Result<void> Writer::flush() { return state_->putInputs(); }

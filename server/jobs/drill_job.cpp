@@ -21,8 +21,9 @@ class Kept {
     writer_.emplace(std::move(*writer));
     return {};
   }
-  Result<void> append(const session::Input& input, const session::Output& output) {
-    return writer_ ? writer_->append(input, output) : Result<void>{};
+  Result<void> append(const session::Input& input, const session::Output& output,
+                      std::span<const std::uint32_t> removed, const point_volume::PointVolume& volume) {
+    return writer_ ? writer_->append(input, output, removed, volume) : Result<void>{};
   }
   Result<void> finish() { return writer_ ? writer_->finish() : Result<void>{}; }
   [[nodiscard]] const std::vector<std::byte>& bytes() const { return *bytes_; }
@@ -54,7 +55,9 @@ Result<Run> run(session::Session& session, const DrillJob& job, std::uint64_t in
     const session::Output output = session.step(
         input, [&](std::span<const std::uint32_t> some) { removed.insert(removed.end(), some.begin(), some.end()); });
     result.step_s += watch.lap_s();
-    if (const auto appended = kept.append(input, output); !appended) return tl::unexpected(appended.error());
+    if (const auto appended = kept.append(input, output, removed, session.volume()); !appended) {
+      return tl::unexpected(appended.error());
+    }
     if (output.status == session::Status::Ok) {
       accumulator.add({input.t_us, input.tip_mm, input.axis, input.spinning, output.thrust_N, removed});
       result.cycles = output.cycle;
@@ -184,6 +187,9 @@ Result<Figures> replay(std::span<const std::byte> bytes, const Progress& progres
   if (!report) return tl::unexpected(report.error());
   return Figures{{"verified", report->verified},    {"cycles", report->cycles},
                  {"hash", hex(report->state_hash)}, {"first_difference", report->first_difference},
+                 {"discs", report->discs},          {"comparable", report->comparable},
+                 {"finding", describe(*report)},    {"inputs", read->inputs.size()},
+                 {"bytes", bytes.size()},           {"format", read->version},
                  {"complete", read->complete},      {"engine", read->header.config.engine},
                  {"case_id", read->header.case_id}, {"path_id", read->header.path_id},
                  {"scene", read->header.scene},     {"core_version", read->header.core_version},

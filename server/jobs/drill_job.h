@@ -44,7 +44,8 @@ struct DrillJob {
 /// @error NotFound (engine), Limit (cycles), Io.
 [[nodiscard]] Result<Figures> drill(store::Store* store, DrillSite site, const DrillJob& job, const Progress& progress);
 
-/// Figures: verified, cycles, hash, first_difference, complete, engine, case_id, path_id, scene, core_version, total_s.
+/// Figures: verified, cycles, hash, first_difference, discs, comparable, finding, inputs, bytes, format, complete,
+/// engine, case_id, path_id, scene, core_version, total_s.
 /// @error as recording::read and recording::replay.
 [[nodiscard]] Result<Figures> replay(std::span<const std::byte> bytes, const Progress& progress);
 

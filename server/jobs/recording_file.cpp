@@ -63,9 +63,10 @@ Result<RecordingFile> RecordingFile::begin(store::Store& store, const recording:
   return RecordingFile(std::move(state));
 }
 
-Result<void> RecordingFile::append(const session::Input& input, const session::Output& output) {
+Result<void> RecordingFile::append(const session::Input& input, const session::Output& output,
+                                   std::span<const std::uint32_t> removed, const point_volume::PointVolume& volume) {
   if (output.status == session::Status::Ok) state_->cycles = output.cycle;
-  auto appended = state_->writer->append(input, output);
+  auto appended = state_->writer->append(input, output, removed, volume);
   if (!appended) return appended;
   const auto now = std::chrono::steady_clock::now();
   if (now - state_->flushed < kFlushEvery) return {};

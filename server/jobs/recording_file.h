@@ -22,8 +22,9 @@ class RecordingFile {
   RecordingFile& operator=(RecordingFile&&) noexcept;
   ~RecordingFile();  ///< without keep(): the file stays for recoverRecordings()
 
-  /// Keeps the input, and puts what is waiting on disk about once a second. @error Io.
-  [[nodiscard]] Result<void> append(const session::Input& input, const session::Output& output);
+  /// As recording::Writer::append, and puts what is waiting on disk about once a second. @error Io.
+  [[nodiscard]] Result<void> append(const session::Input& input, const session::Output& output,
+                                    std::span<const std::uint32_t> removed, const point_volume::PointVolume& volume);
 
   /// Ends the file, moves it among the blobs and adds its row.
   /// @param complete  the drill was finished by its trainee, not cut off. @error Io, NotFound.

@@ -98,7 +98,7 @@ Answer DrillSession::State::poses(const wire::Poses& batch) {
     const session::Output output = drill->session.step(input, [this](std::span<const std::uint32_t> some) {
       drill->removed.insert(drill->removed.end(), some.begin(), some.end());
     });
-    if (const auto kept = drill->recording.append(input, output); !kept) {
+    if (const auto kept = drill->recording.append(input, output, drill->removed, drill->session.volume()); !kept) {
       return end(refusal(kept.error().message, kInternalError));
     }
     if (output.status == session::Status::Ok) {

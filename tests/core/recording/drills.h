@@ -74,8 +74,11 @@ inline Recorded record(const std::vector<session::Input>& inputs, std::size_t fl
                 }).value();
   auto session = session::Session::create(smallVolume(), smallHeader().config).value();
   for (std::size_t i = 0; i < inputs.size(); ++i) {
-    const session::Output output = session.step(inputs[i]);
-    EXPECT_TRUE(writer.append(inputs[i], output).has_value());
+    std::vector<std::uint32_t> removed;
+    const session::Output output = session.step(inputs[i], [&](std::span<const std::uint32_t> some) {
+      removed.insert(removed.end(), some.begin(), some.end());
+    });
+    EXPECT_TRUE(writer.append(inputs[i], output, removed, session.volume()).has_value());
     recorded.final_hash = output.state_hash;
     recorded.accepted = output.cycle;
     if (flush_every > 0 && (i + 1) % flush_every == 0) {

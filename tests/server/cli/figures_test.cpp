@@ -233,10 +233,12 @@ TEST(Replay, OfAChangedRecordingIsNotVerifiedAndEndsWithOne) {
   const std::string file = (folder.path() / "on.rec").string();
   ASSERT_EQ(run({"drill", "--volume", "report", "--scene", "on", "--cycles", "1500", "--out", file}).code, 0);
   EXPECT_EQ(run({"replay", file, "--json"}).json()["scene"], "on");
-  // cut inside the first chunk of inputs: nothing is left to verify
-  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 20'000);
+  // cut inside the last chunk of inputs: the one before it is left to verify
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 200);
   const auto cut = run({"replay", file, "--json"});
   EXPECT_EQ(cut.json()["complete"], false);
+  EXPECT_EQ(cut.json()["inputs"], 1000);
+  EXPECT_EQ(cut.json()["finding"], "verified: 1000 cycles re-run, the same state");
   EXPECT_EQ(cut.code, cut.json()["verified"].get<bool>() ? 0 : 1);
   std::filesystem::resize_file(file, 100);
   EXPECT_EQ(run({"replay", file}).code, 1);

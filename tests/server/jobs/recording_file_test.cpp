@@ -24,7 +24,10 @@ RecordingFile drillInto(store::Store& store, const test::SmallCase& small, std::
   session::Session session = session::Session::create(std::move(site.volume), site.config).value();
   for (std::uint64_t i = 0; i < cycles; ++i) {
     const session::Input input = session::sceneInput(session::Scene::On, i, -1);
-    EXPECT_TRUE(file.append(input, session.step(input)).has_value());
+    std::vector<std::uint32_t> removed;
+    const session::Output output = session.step(
+        input, [&](std::span<const std::uint32_t> some) { removed.insert(removed.end(), some.begin(), some.end()); });
+    EXPECT_TRUE(file.append(input, output, removed, session.volume()).has_value());
     if (each) each(i);
   }
   return file;

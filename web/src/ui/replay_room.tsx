@@ -125,7 +125,7 @@ function VerifiedBadge({ session }: { session: ReplaySession }) {
       <span>
         {verdict.verified
           ? `Verified: ${verdict.cycles.toLocaleString("en")} cycles re-run, same state`
-          : `Not verified: differs at cycle ${verdict.first_difference.toLocaleString("en")}`}
+          : verdict.finding.replace(/^n/, "N")}
       </span>
     </p>
   );

@@ -49,6 +49,12 @@ export interface Verdict {
   cycles: number;
   hash: string;
   first_difference: number;
+  /** Of the point volume, counted from 0. */
+  discs: number[];
+  /** False: recorded before version 0.2, which hashed states otherwise. */
+  comparable: boolean;
+  /** All of that in a line, for people. */
+  finding: string;
 }
 
 export interface CorePlayer {
