@@ -17,8 +17,8 @@ namespace spinaltap::drill {
 /// A pose takes as many cuts as the motion needs. Who has only so much time takes fewer, and the rest the next time.
 class Sweep {
  public:
-  static constexpr double kSurvival = 0.25;  ///< of a spacing
-  static constexpr std::size_t kMostPoses = 46;  ///< as many cycles as the longest way through a lattice takes at 0.1 mm
+  static constexpr double kSurvival = 0.25;      ///< of a spacing
+  static constexpr std::size_t kMostPoses = 46;  ///< the longest way through a lattice takes so many cycles at 0.1 mm
 
   /// @pre both are valid.
   Sweep(const point_volume::Lattice& lattice, const plan::Bit& bit);
