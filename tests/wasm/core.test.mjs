@@ -28,7 +28,7 @@ for (const { scene, engine, discs, cycles, hash, removed } of scenes) {
 }
 
 test("a scene without a number of cycles or discs runs whole", () => {
-  const whole = scenes.find((s) => s.scene === "on" && s.discs === 378 && s.engine === "bounded");
+  const whole = scenes.find((s) => s.scene === "on" && s.discs === 378 && s.engine === "clearance");
   assert.equal(core.runScene("on", "", 0, 0).hash, whole.hash);
 });
 
@@ -71,7 +71,7 @@ test("a recording of a session replays to the same hash, and stepping may go on 
   const header = JSON.parse(player.headerJson());
   assert.equal(header.case_id, "c7k2m9xq");
   assert.equal(header.path_id, "p1");
-  assert.equal(header.engine, "bounded");
+  assert.equal(header.engine, "clearance");
   assert.equal(header.complete, true);
   assert.deepEqual(header.bit, { diameter_mm: 1.2, cone_length_mm: 0.8, length_mm: 10 });
   assert.deepEqual(header.lattice, { spacing_mm: 0.1, rings: 12, discs: 30, first_disc: -2 });

@@ -104,7 +104,9 @@ TEST(Sweep, MovesNoPointOfTheBitFartherThanItSaysAndArrives) {
     BitPose to{from.tip_mm + direction(random) * random.uniform(0, 5), direction(random)};
     if (i % 5 == 0) to.axis = -from.axis;
     if (i % 5 == 1) to.axis = normalized(direction(random) * 1e-4 - from.axis);
-    Sweep sweep({spacing, 20, 100, -50}, bit);
+    // A lattice that the bit can touch wherever it is.
+    const int wide = static_cast<int>(20 / spacing);
+    Sweep sweep({spacing, wide, 2 * wide, -wide}, bit);
     ASSERT_TRUE(sweep.add(from, true) && sweep.add(to, true));
     const std::vector<BitPose> all = cuts(sweep);
     ASSERT_EQ(all.back().tip_mm, to.tip_mm);

@@ -46,7 +46,7 @@ const golden = readFileSync(resolve(top, "tests/scenes/golden/scenes.csv"), "utf
   // The program's engine in full, the others where they are quick.
   .filter(
     ([scene, engine, , , , , runs]) =>
-      /^(on|off|hand)$/.test(scene!) && (runs === "short" || engine === "bounded"),
+      /^(on|off|hand)$/.test(scene!) && (runs === "short" || engine === "clearance"),
   );
 
 describe("scenes in Chromium", () => {
