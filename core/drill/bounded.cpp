@@ -11,14 +11,6 @@ namespace {
 
 using point_volume::Lattice;
 
-/// floor or ceil of value, held inside 0 .. limit before it becomes an integer.
-int clampedFloor(double value, int limit) {
-  return static_cast<int>(std::floor(std::min(std::max(value, -1.0), static_cast<double>(limit))));
-}
-int clampedCeil(double value, int limit) {
-  return static_cast<int>(std::ceil(std::min(std::max(value, 0.0), static_cast<double>(limit))));
-}
-
 void cutRing(Cutter& cutter, int disc, int ring, const PolarCircle& section, double spacing_mm) {
   const std::uint32_t start = Lattice::ringStart(ring);
   if (ring == 0) return cutter.cut(disc, 0, 1);
@@ -33,10 +25,10 @@ void cutDisc(Cutter& cutter, const Lattice& lattice, int disc, const PolarCircle
   const double spacing = lattice.spacing_mm, d = section.distance_mm, radius = section.radius_mm;
   const int outermost = lattice.rings - 1;
   // Rings wholly inside the circle are one run of points.
-  const int whole = clampedFloor((radius - d) / spacing, outermost);
+  const int whole = heldFloor((radius - d) / spacing, outermost);
   if (whole >= 0) cutter.cut(disc, 0, Lattice::ringStart(whole + 1));
-  const int first = std::max(whole + 1, clampedCeil((d - radius) / spacing, outermost + 1));
-  const int last = clampedFloor((d + radius) / spacing, outermost);
+  const int first = std::max(whole + 1, heldCeil((d - radius) / spacing, outermost + 1));
+  const int last = heldFloor((d + radius) / spacing, outermost);
   for (int ring = first; ring <= last; ++ring) cutRing(cutter, disc, ring, section, spacing);
 }
 
@@ -49,12 +41,9 @@ class Bounded final : public Engine {
   [[nodiscard]] std::size_t bytes() const override { return tools_.bytes(); }
 
   Removal step(point_volume::PointVolume& volume, const BitPose& pose, RemovedSink removed) override {
-    const Lattice& lattice = volume.lattice;
     Cutter cutter(tools_, volume, pose, removed);
-    const Span reach = reachAlongPath(tools_.shape, pose);
-    const double first_disc = lattice.first_disc;
-    cutReachable(cutter, tools_.shape, pose, clampedCeil(reach.low_mm / lattice.spacing_mm - first_disc, lattice.discs),
-                 clampedFloor(reach.high_mm / lattice.spacing_mm - first_disc, lattice.discs - 1));
+    const DiscRange reached = discsWithin(reachAlongPath(tools_.shape, pose), volume.lattice);
+    cutReachable(cutter, tools_.shape, pose, reached.first, reached.last);
     return cutter.finish();
   }
 

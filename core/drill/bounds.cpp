@@ -26,6 +26,18 @@ Span reachAlongPath(const BitShape& bit, const BitPose& pose) {
   return {std::min(pose.tip_mm.z, end_mm) - wide_mm, std::max(pose.tip_mm.z, end_mm) + wide_mm};
 }
 
+int heldFloor(double value, int limit) {
+  return static_cast<int>(std::floor(std::min(std::max(value, -1.0), static_cast<double>(limit))));
+}
+int heldCeil(double value, int limit) {
+  return static_cast<int>(std::ceil(std::min(std::max(value, 0.0), static_cast<double>(limit))));
+}
+
+DiscRange discsWithin(const Span& span, const point_volume::Lattice& lattice, double slack_mm) {
+  return {heldCeil((span.low_mm - slack_mm) / lattice.spacing_mm - lattice.first_disc, lattice.discs),
+          heldFloor((span.high_mm + slack_mm) / lattice.spacing_mm - lattice.first_disc, lattice.discs - 1)};
+}
+
 Circle sectionCircle(const BitShape& bit, const BitPose& pose, double z_mm) {
   // A point of the section has tip.z - z = along * axis.z - w.z. With |w.z| <= radius * lean this leaves an interval of
   // `along`; the axis over that interval, widened by the largest radius in it, holds the section.
@@ -53,21 +65,6 @@ double roughArcCos(double x) {
   const double p = ((-0.0187293 * y + 0.0742610) * y - 0.2121144) * y + 1.5707288;
   const double acute = std::sqrt(1.0 - y) * p;
   return x >= 0 ? acute : kPi - acute;
-}
-
-double roughTurn(double x, double y) {
-  const double a = std::abs(x), b = std::abs(y), longer = std::max(a, b);
-  if (!(longer > 0)) return 0;
-  const double t = std::min(a, b) / longer, q = t * t;
-  constexpr double kSeries[] = {0.0028662257, -0.0161657367, 0.0429096138, -0.0752896400, 0.1065626393, -0.1420889944,
-                                0.1999355085, -0.3333314528, 1.0};
-  double series = 0;
-  for (const double next : kSeries) series = series * q + next;
-  double turn = series * t * (0.5 / kPi);
-  if (b > a) turn = 0.25 - turn;
-  if (x < 0) turn = 0.5 - turn;
-  if (y < 0) turn = 1.0 - turn;
-  return turn < 1.0 ? turn : 0.0;
 }
 
 PolarCircle polar(const Circle& circle) {

@@ -22,6 +22,16 @@ struct Span {
 };
 [[nodiscard]] Span reachAlongPath(const BitShape& bit, const BitPose& pose);
 
+/// floor or ceil of a value, held inside 0 .. limit (floor: from -1) before it becomes an integer.
+[[nodiscard]] int heldFloor(double value, int limit);
+[[nodiscard]] int heldCeil(double value, int limit);
+
+/// The discs of a lattice that lie in a span widened by `slack_mm`: first .. last, empty when first > last.
+struct DiscRange {
+  int first = 0, last = -1;
+};
+[[nodiscard]] DiscRange discsWithin(const Span& span, const point_volume::Lattice& lattice, double slack_mm = 0);
+
 /// A circle that holds the bit's section with the plane z = z_mm, margin included; radius < 0 when the bit misses it.
 struct Circle {
   double x_mm = 0, y_mm = 0, radius_mm = -1;
@@ -48,9 +58,5 @@ struct PolarCircle {
 /// Coefficients: Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.45 (error 6.7e-5).
 [[nodiscard]] double roughArcCos(double x);
 inline constexpr double kAngleError_rad = 7e-5;
-
-/// The direction of (x, y) in turns, 0 <= turn < 1, to within 4e-9, by + - * / alone; 0 for the zero vector.
-/// Coefficients: Abramowitz and Stegun, 4.4.49 (error of the arctangent 2e-8).
-[[nodiscard]] double roughTurn(double x, double y);
 
 }  // namespace spinaltap::drill

@@ -137,7 +137,7 @@ class Clearance final : public Engine {
 
   void visit(Cutter& cutter, const Sections& sections, const Touched& touched) {
     const int disc = touched.disc, rings = cutter.volume().lattice.rings;
-    const Disc at{disc, sections.at(disc), touched.turn};
+    const Disc at{disc, sections.at(disc, touched.about), touched.turn};
     double nearest = touched.beyond_mm2;
     if (touched.whole >= known_.first_ring[disc]) nearest = std::min(nearest, cutWhole(cutter, at, touched.whole));
     for (std::uint64_t bits = touched.rings; bits != 0; bits &= bits - 1) {
@@ -152,9 +152,7 @@ class Clearance final : public Engine {
   double cutWhole(Cutter& cutter, const Disc& at, int whole) {
     const Lattice& lattice = cutter.volume().lattice;
     std::uint16_t& first = known_.first_ring[at.disc];
-    const double away = std::sqrt(squared(at.section.x_mm) + squared(at.section.y_mm));
-    const int sure = static_cast<int>(
-        std::min(std::floor((at.section.inner_mm - away) / lattice.spacing_mm), static_cast<double>(whole)));
+    const int sure = heldFloor((at.section.inner_mm - at.section.away_mm()) / lattice.spacing_mm, whole);
     const int split = std::max<int>(first, sure + 1);
     cutter.take(at.disc, Lattice::ringStart(first), Lattice::ringStart(split));
     cutter.cut(at.disc, Lattice::ringStart(split), Lattice::ringStart(whole + 1));
@@ -231,7 +229,7 @@ class Clearance final : public Engine {
   int takeArc(Cutter& cutter, const Disc& at, int ring, int offset, int to, const SlotAt& slotAt) {
     const Section& section = at.section;
     const double radius = ring * cutter.volume().lattice.spacing_mm;
-    const double away = std::sqrt(squared(section.x_mm) + squared(section.y_mm));
+    const double away = section.away_mm();
     const double cosine = (squared(away) + squared(radius) - squared(section.inner_mm)) / (2 * away * radius);
     if (!(cosine < 1.0)) return offset;
     const double half_arc = (cosine > -1.0 ? roughArcCos(cosine) : kPi) - 3 * kAngleError_rad;

@@ -15,14 +15,6 @@ constexpr double kBluntCone = 0.2;  // g below this: the cone is too blunt for t
 // and k v below 1, and k v e / g in its centre.
 constexpr double kPlane = 2 / kBluntCone;
 
-/// floor or ceil of value, held inside 0 .. limit before it becomes an integer.
-int heldFloor(double value, int limit) {
-  return static_cast<int>(std::floor(std::min(std::max(value, -1.0), static_cast<double>(limit))));
-}
-int heldCeil(double value, int limit) {
-  return static_cast<int>(std::ceil(std::min(std::max(value, 0.0), static_cast<double>(limit))));
-}
-
 }  // namespace
 
 Sections::Sections(const BitShape& bit, const BitPose& pose, const point_volume::Lattice& lattice, double slack_mm)
@@ -30,9 +22,8 @@ Sections::Sections(const BitShape& bit, const BitPose& pose, const point_volume:
   const double outermost = static_cast<double>(lattice.rings - 1) * lattice.spacing_mm;
   const double beside = std::sqrt(tip_mm_.x * tip_mm_.x + tip_mm_.y * tip_mm_.y);
   if (beside > outermost + bit.length_mm + bit.radius_mm + touch_mm_) return;
-  const Span reach = reachAlongPath(bit, pose);
-  first_ = heldCeil((reach.low_mm - slack_mm) / lattice.spacing_mm - lattice.first_disc, lattice.discs);
-  last_ = heldFloor((reach.high_mm + slack_mm) / lattice.spacing_mm - lattice.first_disc, lattice.discs - 1);
+  const DiscRange reached = discsWithin(reachAlongPath(bit, pose), lattice, slack_mm);
+  first_ = reached.first, last_ = reached.last;
   upright_ = std::abs(axis_.z);
   flat_ = upright_ < kFlat;
   if (flat_) return;
@@ -51,15 +42,14 @@ Sections::Sections(const BitShape& bit, const BitPose& pose, const point_volume:
 
 double Sections::along(int disc) const { return (tip_mm_.z - lattice_.discZ_mm(disc)) * per_z_; }
 
-Section Sections::at(int disc) const {
+Section Sections::at(int disc, About about) const {
   const double c = along(disc);
   Section section;
-  const bool in_cone = coned_ && cone_outer_ * c < shaft_outer_;
+  const bool in_cone = about == About::Cone;
   const double per_along = in_cone ? 1.0 + cone_shift_ : 1.0;
   section.x_mm = tip_mm_.x - c * per_along * axis_.x;
   section.y_mm = tip_mm_.y - c * per_along * axis_.y;
-  section.outer_mm = in_cone ? cone_outer_ * c + touch_mm_ : shaft_outer_;
-  if (coned_ ? c < -touch_mm_ : c < -(shaft_outer_ * lean_ + touch_mm_)) return {};
+  section.outer_mm = in_cone ? std::max(0.0, cone_outer_ * c + touch_mm_) : shaft_outer_;
   // Inside: what the other body, the tip and the end leave of the circle.
   const double apart = std::abs(c) * cone_shift_ * lean_;
   const double reach = (section.outer_mm + apart) * lean_ + touch_mm_;

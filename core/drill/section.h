@@ -10,17 +10,25 @@
 // The bit is the intersection of both, so each ellipse's longer half axis gives a circle around the section, and the
 // shorter one, less what the other body may cut off, a circle inside it.
 #pragma once
+#include <cmath>
+
 #include "core/drill/engine.h"
 #include "core/drill/predicate.h"
 
 namespace spinaltap::drill {
 
 /// Circles about one centre, path frame, mm: every point of the section lies within `outer_mm`, and every point of the
-/// disc within `inner_mm` lies in the section, to the predicate's satisfaction. Negative: there is none.
+/// disc within `inner_mm` lies in the section, to the predicate's satisfaction. Negative `inner_mm`: there is none.
 struct Section {
   double x_mm = 0, y_mm = 0;
-  double outer_mm = -1, inner_mm = -1;
+  double outer_mm = 0, inner_mm = -1;
+
+  /// Of the centre from the path.
+  [[nodiscard]] double away_mm() const { return std::sqrt(x_mm * x_mm + y_mm * y_mm); }
 };
+
+/// Which of the two ellipses a section's circles are about. Both hold; the smaller one is the better choice.
+enum class About { Shaft, Cone };
 
 /// Outer circles in single precision, linear in the disc's number until the cone meets the cylinder: what is asked of
 /// every disc in every cycle. A disc n of them lies `along = along_0 - n * along_step` behind the tip.
@@ -32,6 +40,9 @@ struct SectionLine {
   float cone_offset, cone_slope;  ///< of the radius in the cone
   float shaft_radius;
   float first_along;  ///< less than that, and the disc is beyond the tip
+
+  /// Of a disc with this outer radius, the smaller of both.
+  [[nodiscard]] About about(float outer) const { return outer < shaft_radius ? About::Cone : About::Shaft; }
 };
 
 class Sections {
@@ -45,8 +56,12 @@ class Sections {
   /// True when the bit lies so flat that circles say nothing.
   [[nodiscard]] bool isFlat() const { return flat_; }
 
-  /// @pre !isFlat(), first() <= disc <= last().
-  [[nodiscard]] Section at(int disc) const;
+  /// False when the bit has no cone, or one too blunt for the tilt to say anything of.
+  [[nodiscard]] bool isConed() const { return coned_; }
+
+  /// Where line() said which circle a disc has, this must be asked for the same: their centres may lie mm apart.
+  /// @pre !isFlat(), first() <= disc <= last(); isConed() for About::Cone.
+  [[nodiscard]] Section at(int disc, About about) const;
   /// The same outer circles, disc `first` being number 0; by at most 2 * margin_mm() wider.
   [[nodiscard]] SectionLine line(int first) const;
   /// What single precision and the predicate's touch can amount to.

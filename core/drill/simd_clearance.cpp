@@ -132,7 +132,7 @@ HWY_INLINE Touched LookAt(const Known<Slot>& known, int disc, const Look& look) 
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const RingRange range = ringsNear(known, disc, look);
   const VR reach = hn::Set(d, look.outer_mm * look.outer_mm), end = hn::Set(d, static_cast<float>(range.last));
-  Touched touched{disc, range.whole, range.first, 1 + (range.last - range.first) / 64, 0, 0, look.turn};
+  Touched touched{disc, range.whole, range.first, 1 + (range.last - range.first) / 64, 0, 0, look.turn, About::Shaft};
   VR beyond = hn::Set(d, range.beyond_mm2);
   for (int ring = range.first; ring <= range.last; ring += lanes) {
     const VR squared = Squared(known, known.gap(disc, ring), look, ring);
@@ -160,6 +160,7 @@ HWY_INLINE int FindTouched(const SectionLine& line, const Known<Slot>& known, in
   int cut = 0;
   for (std::size_t n = 0; n < found; ++n) {
     touched[cut] = LookAt(known, due.disc[n], {due.outer[n], due.away[n], due.turn[n]});
+    touched[cut].about = line.about(due.outer[n]);
     due.radius[n] = touched[cut].beyond_mm2;
     cut += touched[cut].rings != 0 || touched[cut].whole >= known.first_ring[due.disc[n]];
   }

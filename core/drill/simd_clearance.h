@@ -73,6 +73,7 @@ struct Touched {
   std::uint64_t rings;  ///< set where points of them may be in the circle
   float beyond_mm2;     ///< squared distance from the section's centre to whatever is alive on other rings
   float turn;           ///< the direction of the centre
+  About about;          ///< whose circle it is
 };
 
 /// Of discs first .. first + count - 1, writes to `touched`, ascending, those whose sections may hold alive points, and

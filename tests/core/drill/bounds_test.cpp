@@ -19,20 +19,6 @@ TEST(RoughArcCos, IsAsGoodAsItSays) {
   }
 }
 
-TEST(RoughTurn, IsAsGoodAsItSays) {
-  Random random(9);
-  for (int i = 0; i < 200000; ++i) {
-    const double size = std::ldexp(1.0, static_cast<int>(random.below(60)) - 30);
-    const double x = size * random.uniform(-1, 1), y = random.below(4) == 0 ? 1e-9 * x : size * random.uniform(-1, 1);
-    const double turn = roughTurn(x, y);
-    ASSERT_GE(turn, 0.0);
-    ASSERT_LT(turn, 1.0);
-    const double apart = turn - std::atan2(y, x) / (2 * kPi);
-    ASSERT_NEAR(apart - std::floor(apart + 0.5), 0.0, 4e-9);
-  }
-  EXPECT_EQ(roughTurn(0, 0), 0.0);
-}
-
 BitPose randomPose(Random& random) {
   BitPose pose;
   pose.tip_mm = {random.uniform(-5, 5), random.uniform(-5, 5), random.uniform(-5, 5)};

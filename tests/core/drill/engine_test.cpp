@@ -216,6 +216,36 @@ TEST_P(Exact, RemovesWhatTheReferenceRemovesInEveryCycleOfAHand) {
   EXPECT_GT(reached, 20u * GetParam().hands);
 }
 
+TEST_P(Exact, RemovesWhatTheReferenceRemovesWhereTheConeMeetsTheShaft) {
+  // Short cones and tilts, where the two ellipses of a section have far-off middles, and a disc that the bit meets just
+  // where one gives way to the other, to some 1e-5 mm either way.
+  std::uint64_t removed = 0;
+  for (std::uint64_t seed = 1; seed <= 400; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(5000 + seed);
+    plan::Bit bit{random.uniform(1, 5), 0, 20};
+    bit.cone_length_mm = random.uniform(0.4, 2) * bit.diameter_mm;
+    const Lattice lattice{0.1, 45, 3, -1};
+    PointVolume a = *point_volume::solidVolume(lattice, 300), b = a;
+    const auto truth_engine = reference(a, bit), our_engine = engine(b, bit);
+    const double tilt = random.uniform(2, 20) * kPi / 180;
+    double azimuth = random.uniform(0, 2 * kPi);
+    for (int i = 0; i < 30; ++i, azimuth += random.uniform(0, 0.02)) {
+      const Vec3 axis = direction(tilt, azimuth);
+      // Section.h: the cone's ellipse reaches k c u / g, the shaft's R / u; here they are as wide as each other.
+      const double k = bit.diameter_mm / 2 / bit.cone_length_mm, u = axis.z, g = u * u - k * k * (1 - u * u);
+      const double c = bit.diameter_mm / 2 / u * g / (k * u) + random.uniform(-1e-4, 1e-4) / k;
+      const double off = 0.02 * i;
+      const BitPose pose{Vec3{off, 0.3 * off, 0} + Vec3{axis.x, axis.y, 0} * c + Vec3{0, 0, u * c}, axis};
+      const Removal truth = truth_engine->step(a, pose), ours = our_engine->step(b, pose);
+      ASSERT_EQ(difference(a, b), "") << "cycle " << i;
+      ASSERT_EQ(ours.count, truth.count);
+      removed += truth.count;
+    }
+  }
+  EXPECT_GT(removed, 100000u);
+}
+
 INSTANTIATE_TEST_SUITE_P(Engines, Exact,
                          testing::Values(Kind{"Bounded", "bounded", {}}, Kind{"Clearance", "clearance", {}, 40},
                                          Kind{"ClearanceOnTwoThreads", "clearance", {Precision::Double, 2}},
