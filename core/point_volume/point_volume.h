@@ -1,5 +1,6 @@
 // core/point_volume/point_volume.h - which points of the lattice are bone, and how dense each is.
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -19,6 +20,10 @@ struct PointVolume {
   std::vector<std::uint16_t> density_mg_cm3;  ///< #points; apparent density, 0 where no bone is
 
   [[nodiscard]] bool isAlive(std::uint32_t index) const { return (alive[index >> 6] >> (index & 63)) & 1u; }
+  /// What the bits and densities take in memory: 2.125 bytes a point.
+  [[nodiscard]] std::size_t bytes() const {
+    return alive.capacity() * sizeof(alive[0]) + density_mg_cm3.capacity() * sizeof(density_mg_cm3[0]);
+  }
 };
 
 /// Apparent density of bone from HU: 47 + 1.122 HU kg/m3 (= mg/cm3), the lumbar relation of Rho, Hobatho and Ashman,

@@ -84,10 +84,7 @@ std::size_t Player::bytes() const {
   const auto of = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
   std::size_t sum = of(recording_.inputs) + of(thrust_N_) + of(gone_) + of(refused_) + of(removed_);
   for (const auto& frame : keyframes_) sum += of(frame);
-  for (const point_volume::PointVolume* volume : {&volume_, &recording_.volume}) {
-    sum += of(volume->alive) + of(volume->density_mg_cm3);
-  }
-  return sum;
+  return sum + volume_.bytes() + recording_.volume.bytes();
 }
 
 }  // namespace spinaltap::recording

@@ -51,11 +51,6 @@ Result<Timed> runOnce(const DrillScene& scene, const Lattice& lattice, const Dri
   return out;
 }
 
-std::size_t bytesOf(const PointVolume& volume) {
-  return volume.alive.size() * sizeof(volume.alive[0]) +
-         volume.density_mg_cm3.size() * sizeof(volume.density_mg_cm3[0]);
-}
-
 void measureRemoval(const DrillScene& scene, const Lattice& lattice, const std::vector<std::uint64_t>& removed,
                     DrillMeasured& row) {
   const double each_mm3 = point_volume::pointVolume_mm3(lattice);
@@ -99,7 +94,7 @@ Result<void> measureRow(const DrillScene& scene, const Lattice& lattice, const D
       continue;
     }
     fastest = std::move(run->each_s);
-    row.bytes = bytesOf(run->volume) + run->engine_bytes;
+    row.bytes = run->volume.bytes() + run->engine_bytes;
     measureRemoval(scene, lattice, run->removed, row);
     if (first.empty()) first = run->volume.alive;
     row.differing = differing(first, run->volume.alive);

@@ -82,8 +82,6 @@ double timed(const Step& step, Run& run) {
   return std::chrono::duration<double, std::nano>(stop - start).count();
 }
 
-std::size_t bytesOf(const PointVolume& volume) { return volume.alive.size() * 8 + volume.density_mg_cm3.size() * 2; }
-
 /// Every cycle of a script, and of each its fastest of `repeats` runs.
 Run runAll(const std::string& engine_name, const Script& script, const Lattice& lattice, int repeats) {
   Run best;
@@ -92,8 +90,7 @@ Run runAll(const std::string& engine_name, const Script& script, const Lattice& 
     const auto engine = *drill::makeEngine(engine_name, volume, session::reportBit());
     Run run;
     for (const BitPose& pose : script.poses) run.ns.push_back(timed([&] { return engine->step(volume, pose); }, run));
-    run.bytes_per_point =
-        static_cast<double>(bytesOf(volume) + engine->bytes()) / static_cast<double>(lattice.points());
+    run.bytes_per_point = static_cast<double>(volume.bytes() + engine->bytes()) / static_cast<double>(lattice.points());
     if (r == 0) best = run;
     for (std::size_t i = 0; i < run.ns.size(); ++i) best.ns[i] = std::min(best.ns[i], run.ns[i]);
   }
@@ -116,7 +113,7 @@ Run runSampled(const std::string& name, const Script& script, const Lattice& lat
       }
     }
     run.bytes_per_point =
-        static_cast<double>(bytesOf(volume) + reference->bytes()) / static_cast<double>(lattice.points());
+        static_cast<double>(volume.bytes() + reference->bytes()) / static_cast<double>(lattice.points());
     return run;
   }
   const auto grid = bench::makeGrid(name, lattice, session::reportBit(), session::kSceneDensity_mg_cm3);
