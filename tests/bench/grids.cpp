@@ -27,6 +27,14 @@ struct Shape {
   [[nodiscard]] bool inCylinder(int i, int j) const {
     return (i - half) * (i - half) + (j - half) * (j - half) <= half * half;
   }
+  /// Calls visit(i, j, slice) for every place in the cylinder.
+  template <class Visit>
+  void forEachInCylinder(Visit&& visit) const {
+    for (int slice = 0; slice < slices; ++slice)
+      for (int j = 0; j < wide; ++j)
+        for (int i = 0; i < wide; ++i)
+          if (inCylinder(i, j)) visit(i, j, slice);
+  }
   [[nodiscard]] int held(double v, int limit) const {
     return static_cast<int>(std::min(std::max(v, 0.0), static_cast<double>(limit)));
   }
@@ -60,9 +68,7 @@ class Bytes final : public Grid {
         alive_(static_cast<std::size_t>(shape_.wide) * static_cast<std::size_t>(shape_.wide) *
                static_cast<std::size_t>(shape_.slices)),
         density_(alive_.size(), density) {
-    for (int z = 0; z < shape_.slices; ++z)
-      for (int j = 0; j < shape_.wide; ++j)
-        for (int i = 0; i < shape_.wide; ++i) alive_[row(j, z) + static_cast<std::size_t>(i)] = shape_.inCylinder(i, j);
+    shape_.forEachInCylinder([&](int i, int j, int z) { alive_[row(j, z) + static_cast<std::size_t>(i)] = 1; });
   }
   drill::Removal step(const BitPose& pose) override {
     drill::Removal removal;
@@ -144,11 +150,9 @@ class Rows final : public Grid {
         words_((static_cast<std::size_t>(shape_.wide) + 63) / 64),
         alive_(words_ * static_cast<std::size_t>(shape_.wide) * static_cast<std::size_t>(shape_.slices), 0),
         density_(alive_.size() * 64, density) {
-    for (int z = 0; z < shape_.slices; ++z)
-      for (int j = 0; j < shape_.wide; ++j)
-        for (int i = 0; i < shape_.wide; ++i)
-          if (shape_.inCylinder(i, j))
-            alive_[row(j, z) + static_cast<std::size_t>(i) / 64] |= std::uint64_t{1} << (i % 64);
+    shape_.forEachInCylinder([&](int i, int j, int z) {
+      alive_[row(j, z) + static_cast<std::size_t>(i) / 64] |= std::uint64_t{1} << (i % 64);
+    });
   }
   drill::Removal step(const BitPose& pose) override {
     drill::Removal removal;

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/random.h"
 #include "core/point_volume/point_volume.h"
+#include "tests/core/point_volume/random_place.h"
 
 namespace spinaltap::point_volume {
 namespace {
@@ -21,21 +21,13 @@ struct Capsule {
   }
 };
 
-struct Scene {
-  Lattice lattice;
-  Frame frame;
+struct Scene : Place {
   Capsule capsule;
 };
 
 Scene randomScene(std::uint64_t seed) {
   Random random(seed);
-  Scene scene;
-  scene.lattice = {random.uniform(0.08, 0.6), 1 + static_cast<int>(random.below(30)),
-                   1 + static_cast<int>(random.below(60)), static_cast<int>(random.below(20)) - 10};
-  plan::Path path;
-  path.entry_patient = {random.uniform(-500, 500), random.uniform(-500, 500), random.uniform(-500, 500)};
-  path.target_patient = path.entry_patient + Vec3{random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(1, 9)};
-  scene.frame = plan::pathFrame(path);
+  Scene scene{randomPlace(random, 0.08, 0.6, 30, 60), {}};
   const auto near = [&] { return Vec3{random.uniform(-3, 3), random.uniform(-3, 3), random.uniform(-3, 12)}; };
   scene.capsule = {scene.frame.toPatient(near()), scene.frame.toPatient(near()), random.uniform(0.2, 4)};
   return scene;

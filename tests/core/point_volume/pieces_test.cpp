@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/base/random.h"
+#include "tests/core/point_volume/random_place.h"
 
 namespace spinaltap::point_volume {
 namespace {
@@ -31,21 +31,13 @@ void hu(std::span<const Vec3> points, std::span<double> out) {
   for (std::size_t i = 0; i < points.size(); ++i) out[i] = 300 + 100 * std::sin(3 * points[i].z) + 20 * points[i].x;
 }
 
-struct Scene {
-  Lattice lattice;
-  Frame frame;
+struct Scene : Place {
   Field field;
 };
 
 Scene randomScene(std::uint64_t seed) {
   Random random(seed);
-  Scene scene;
-  scene.lattice = {random.uniform(0.1, 0.4), 1 + static_cast<int>(random.below(12)),
-                   1 + static_cast<int>(random.below(50)), static_cast<int>(random.below(20)) - 10};
-  plan::Path path;
-  path.entry_patient = {random.uniform(-500, 500), random.uniform(-500, 500), random.uniform(-500, 500)};
-  path.target_patient = path.entry_patient + Vec3{random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(1, 9)};
-  scene.frame = plan::pathFrame(path);
+  Scene scene{randomPlace(random, 0.1, 0.4, 12, 50), {}};
   const Vec3 middle{random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 8)};
   scene.field = ballOf(scene.frame.toPatient(middle), random.uniform(0.5, 5), random.unit() < 0.5 ? 0.0 : 0.05);
   return scene;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -98,34 +99,39 @@ std::pair<std::uint32_t, Going> aPointThatGoes(const Trace& run, Random& random)
   }
 }
 
-TEST(Divergence, OfAFlippedAliveBitIsNamedByTheCycleThatFirstCutNearItAndByItsDisc) {
+/// Tampers with one point of the volume at a time, four from `seed`, and expects the difference named on its disc
+/// alone; by which cycle is for `expect_cycle(report, cycle in which the point went)` to say.
+void expectNamedOnThePointsDisc(std::uint64_t seed,
+                                const std::function<void(point_volume::PointVolume&, std::uint32_t, Random&)>& tamper,
+                                const std::function<void(const ReplayReport&, std::uint64_t)>& expect_cycle) {
   const Recording recorded = drilled();
   const Trace trace_of_it = trace(recorded);
-  Random random(20021110);
+  Random random(seed);
   for (int run = 0; run < 4; ++run) {
     const auto [point, going] = aPointThatGoes(trace_of_it, random);
     Recording tampered = recorded;
-    tampered.volume.alive[point >> 6] ^= 1ull << (point & 63);
+    tamper(tampered.volume, point, random);
     expectNamed(recorded, trace_of_it, tampered);
     const ReplayReport report = *replay(tampered);
-    EXPECT_LE(report.first_difference, going.cycle);
+    expect_cycle(report, going.cycle);
     EXPECT_EQ(report.discs, std::vector<std::uint32_t>{point / recorded.volume.lattice.pointsPerDisc()});
   }
 }
 
+TEST(Divergence, OfAFlippedAliveBitIsNamedByTheCycleThatFirstCutNearItAndByItsDisc) {
+  const auto flip = [](point_volume::PointVolume& volume, std::uint32_t point, Random&) {
+    volume.alive[point >> 6] ^= 1ull << (point & 63);
+  };
+  expectNamedOnThePointsDisc(
+      20021110, flip, [](const ReplayReport& report, std::uint64_t went) { EXPECT_LE(report.first_difference, went); });
+}
+
 TEST(Divergence, OfAFlippedBitOfADensityIsNamedByTheCycleThatCutThePointAndItsDisc) {
-  const Recording recorded = drilled();
-  const Trace trace_of_it = trace(recorded);
-  Random random(20021111);
-  for (int run = 0; run < 4; ++run) {
-    const auto [point, going] = aPointThatGoes(trace_of_it, random);
-    Recording tampered = recorded;
-    tampered.volume.density_mg_cm3[point] ^= static_cast<std::uint16_t>(1u << random.below(16));
-    expectNamed(recorded, trace_of_it, tampered);
-    const ReplayReport report = *replay(tampered);
-    EXPECT_EQ(report.first_difference, going.cycle);
-    EXPECT_EQ(report.discs, std::vector<std::uint32_t>{point / recorded.volume.lattice.pointsPerDisc()});
-  }
+  const auto flip = [](point_volume::PointVolume& volume, std::uint32_t point, Random& random) {
+    volume.density_mg_cm3[point] ^= static_cast<std::uint16_t>(1u << random.below(16));
+  };
+  expectNamedOnThePointsDisc(
+      20021111, flip, [](const ReplayReport& report, std::uint64_t went) { EXPECT_EQ(report.first_difference, went); });
 }
 
 TEST(Divergence, OfFlippedBitsOfAnInputIsNamedAsSteppingBothSideBySideNamesIt) {
