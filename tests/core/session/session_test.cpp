@@ -57,6 +57,19 @@ TEST(Session, NeedsAboutFourNewtonsInCancellousBoneAtOneMillimetreASecond) {
   EXPECT_NEAR(sum / count, 4.24, 0.4);
 }
 
+TEST(Session, OnTheReportsVolumeTakesNoMoreThanTwoPointTwoBytesAPoint) {
+  // 16 bits of density and one alive bit are 2.125; the tables that make a cycle cheap get the rest. Each structure is
+  // counted with the memory it holds; the engine beside the session is made as the session makes its own.
+  const Session session = makeSession("clearance", reportLattice().discs);
+  const auto engine = drill::makeEngine("clearance", session.volume(), reportBit());
+  ASSERT_TRUE(engine.has_value());
+  const auto points = static_cast<double>(reportLattice().points());
+  const std::size_t bytes = session.volume().bytes() + (*engine)->bytes() + sizeof(Session);
+  EXPECT_EQ(reportLattice().points(), 986958u);
+  EXPECT_LE(static_cast<double>(bytes) / points, 2.2) << bytes << " bytes";
+  EXPECT_GT(static_cast<double>(bytes) / points, 2.125) << "else something is not counted";
+}
+
 TEST(Session, RemovesNothingWithABitThatDoesNotTurn) {
   Session session = makeSession();
   Input input = pose(0, 3);
