@@ -35,6 +35,16 @@ std::string processorName() {
   return {};
 }
 
+/// Minutes of measuring are not to be lost because the page has no place.
+Result<void> checkPage(const std::string& html) {
+  namespace fs = std::filesystem;
+  const fs::path page(html), folder = page.has_parent_path() ? page.parent_path() : fs::path(".");
+  std::error_code ignored;
+  if (html.empty() || (fs::is_directory(folder, ignored) && !fs::is_directory(page, ignored))) return {};
+  return fail(ErrorCode::Io, "trade-off: cannot write " + html + ": " +
+                                 (fs::is_directory(folder, ignored) ? "it is a folder" : "there is no such folder"));
+}
+
 Result<void> check(const DrillTradeoffJob& job) {
   if (job.spacings_mm.empty() || job.threads.empty()) {
     return fail(ErrorCode::InvalidArgument, "trade-off: no spacing, or no number of threads");
@@ -48,7 +58,7 @@ Result<void> check(const DrillTradeoffJob& job) {
       return fail(ErrorCode::InvalidArgument, "trade-off: spacing " + shortNumber(spacing) + " is not 0.01 to 1 mm");
     }
   }
-  return {};
+  return checkPage(job.html);
 }
 
 /// Before anything runs: whether the finest lattice is too large.
@@ -189,7 +199,7 @@ constexpr std::array kColumns{
     DrillColumn{"threads", "threads", "that share a cycle"},
     DrillColumn{"MB", "memory_mb", "memory of point volume and engine"},
     DrillColumn{"build s", "build_s", "to build the point volume of a path of this length in the phantom"},
-    DrillColumn{"us", "median_us", "a cycle, median"},
+    DrillColumn{"p50 us", "median_us", "a cycle, median"},
     DrillColumn{"p99.9 us", "p999_us", "a cycle that one in a thousand exceeds"},
     DrillColumn{"as met", "met_p999_us", "the same of all runs, not the fastest: what the machine made of it, us"},
     DrillColumn{"cycles/s", "cycles_per_s", "of the median cycle"},

@@ -29,7 +29,6 @@ constexpr std::array kColours{kBlue,
                               Colour{"#222", "#dfe3e8"},
                               Colour{"#111", "#f1f3f5"},
                               Colour{"#555", "#aab2bb"}};
-constexpr std::string_view kBudget = "#555";
 
 constexpr std::string_view kStyle = R"(
 :root { color-scheme: light dark; --ink: #1d2126; --soft: #555c64; --page: #fff; --line: #d5d9de; --mark: #e4f0fc; }
@@ -42,7 +41,7 @@ figure { margin: 0; } figcaption { color: var(--soft); font-size: .9rem; } svg {
 .scroll { overflow-x: auto; } .scroll:focus-visible { outline: .15rem solid #1668b8; outline-offset: .15rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .85rem; }
 caption { text-align: left; color: var(--soft); padding-bottom: .4rem; }
-th, td { padding: .25rem .45rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th, td { padding: .25rem .35rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 thead th { border-bottom: 2px solid var(--line); } tr.best { background: var(--mark); }
 dt { font-weight: 600; float: left; clear: left; width: 7rem; } dd { margin: 0 0 .2rem 7.5rem; }
 @media (prefers-color-scheme: dark) {
@@ -80,28 +79,33 @@ struct Chart {
   std::string level_name;
 };
 
+/// Ticks at what was measured; of places too close together for their numbers, the finest.
+std::vector<double> ticksAt(const plots::Axis& axis, std::vector<double> places) {
+  std::sort(places.begin(), places.end());
+  const double apart = std::pow(axis.high / axis.low, 0.1);
+  std::vector<double> ticks;
+  for (const double place : places) {
+    if (ticks.empty() || place >= ticks.back() * apart) ticks.push_back(place);
+  }
+  return ticks;
+}
+
 std::string drawn(const Chart& chart) {
   std::vector<double> xs, ys;
   for (const Line& line : chart.lines) {
     for (const plots::Place& p : line.points) xs.push_back(p[0]), ys.push_back(p[1]);
   }
   if (chart.level > 0) ys.push_back(chart.level);
-  const plots::Axis x = plots::axisFor("spacing, mm", xs, true, false), y = plots::axisFor(chart.unit, ys, true, false);
+  const plots::Axis y = plots::axisFor(chart.unit, ys, true, false);
+  plots::Axis x = plots::axisFor("spacing, mm", xs, true, false);
+  x.ticks = ticksAt(x, xs);
   std::vector<plots::Series> series;
   for (const Line& line : chart.lines)
     series.push_back({line.name, line.colour.light, line.points, {}, true, line.dash});
   const plots::Panel panel{{70, 36}, 370, 240, chart.title};
   plots::Svg svg(460, chart.lines.size() > 2 ? 368 : 350);
-  if (chart.level > 0) {
-    const double share = y.logarithmic ? std::log(chart.level / y.low) / std::log(y.high / y.low)
-                                       : (chart.level - y.low) / (y.high - y.low);
-    const double at = panel.corner[1] + panel.height * (1 - share);
-    plots::drawPoints(svg, panel, x, y, series);
-    svg.line({panel.corner[0], at}, {panel.corner[0] + panel.width, at}, {kBudget, 1.5, "2 4"});
-    svg.text({panel.corner[0] + panel.width - 4, at - 5}, chart.level_name, {11, plots::Anchor::End, kBudget});
-  } else {
-    plots::drawPoints(svg, panel, x, y, series);
-  }
+  plots::drawPoints(svg, panel, x, y, series);
+  if (chart.level > 0) plots::drawLevel(svg, panel, y, chart.level, chart.level_name);
   for (std::size_t n = 0; n < chart.lines.size(); ++n) {  // two names a row, at most two rows
     const Line& line = chart.lines[n];
     const double left = panel.corner[0] + (n % 2 == 0 ? 0 : 0.5 * panel.width);
@@ -150,7 +154,7 @@ std::vector<Chart> chartsOf(const Figures& figures) {
        ""},
       {"Removed volume",
        "error, %",
-       "Against the swept volume, without its sign. The dotted line is what the swept volume is known to.",
+       "Against the swept volume, without its sign. Below the dotted line nothing is certain.",
        {shared(linesOf(rows, "removed_error_percent", false, false)[0], "all of the hole", ""),
         [&] {
           Line line = shared(linesOf(rows, "cycle_error_percent", false, false)[0], "a cycle's mass, mean", "6 3");
@@ -158,7 +162,7 @@ std::vector<Chart> chartsOf(const Figures& figures) {
           return line;
         }()},
        number(figures, "swept_error_percent"),
-       "known to"},
+       "what the swept volume is known to"},
       {"Ripple of the mass removed a cycle",
        "% of the mean",
        "How unevenly an even motion meets the points.",

@@ -6,7 +6,7 @@
 namespace spinaltap::plots {
 namespace {
 
-constexpr Stroke kGrid{"#e4e4e4", 1, ""}, kFrame{"#888", 1, ""};
+constexpr Stroke kGrid{"#e4e4e4", 1, ""}, kFrame{"#888", 1, ""}, kLevel{"#555", 1.5, "2 4"};
 constexpr double kLetter = 6.2;  // px, a letter of 11 px text
 
 double share(const Axis& axis, double value) {
@@ -65,7 +65,7 @@ class Labels {
 }  // namespace
 
 Axis axisFor(std::string title, const std::vector<double>& values, bool logarithmic, bool from_zero) {
-  Axis axis{std::move(title), 0, 1, false};
+  Axis axis{std::move(title), 0, 1, false, {}};
   std::vector<double> finite;
   std::copy_if(values.begin(), values.end(), std::back_inserter(finite), [](double v) { return std::isfinite(v); });
   if (finite.empty()) return axis;
@@ -85,6 +85,7 @@ Axis axisFor(std::string title, const std::vector<double>& values, bool logarith
 }
 
 std::vector<double> ticksOf(const Axis& axis) {
+  if (!axis.ticks.empty()) return axis.ticks;
   std::vector<double> out;
   if (axis.logarithmic) {
     const bool many = axis.high / axis.low > 300;
@@ -118,6 +119,13 @@ void drawPoints(Svg& svg, const Panel& panel, const Axis& x, const Axis& y, cons
       labels.draw(svg, {xOf(panel, x, s.points[n][0]), yOf(panel, y, s.points[n][1])}, s.labels[n], s.colour);
     }
   }
+}
+
+void drawLevel(Svg& svg, const Panel& panel, const Axis& y, double value, const std::string& name) {
+  const double at = yOf(panel, y, value);
+  const bool room_above = at - panel.corner[1] > 20;
+  svg.line({panel.corner[0], at}, {panel.corner[0] + panel.width, at}, kLevel);
+  svg.text({panel.corner[0] + panel.width - 6, room_above ? at - 5 : at + 13}, name, {11, Anchor::End, kLevel.colour});
 }
 
 void drawBars(Svg& svg, const Panel& panel, const Axis& y, const std::vector<BarGroup>& groups,

@@ -11,13 +11,14 @@ namespace spinaltap::plots {
 struct Axis {
   std::string title;  ///< with its unit
   double low = 0, high = 1;
-  bool logarithmic = false;  ///< then low > 0
+  bool logarithmic = false;        ///< then low > 0
+  std::vector<double> ticks = {};  ///< where they stand; empty: at round places
 };
 
 /// An axis that holds these values, with a little room; logarithmic when asked and all are positive. Bars want zero.
 [[nodiscard]] Axis axisFor(std::string title, const std::vector<double>& values, bool logarithmic, bool from_zero);
 
-/// Round places for ticks, from low to high: 1, 2 or 5 times a power of ten.
+/// The axis's own ticks, or round places from low to high: 1, 2 or 5 times a power of ten.
 [[nodiscard]] std::vector<double> ticksOf(const Axis& axis);
 
 struct Series {
@@ -37,6 +38,10 @@ struct Panel {
 };
 
 void drawPoints(Svg& svg, const Panel& panel, const Axis& x, const Axis& y, const std::vector<Series>& series);
+
+/// A dotted line across at a value of the y axis, with its name above it, or below where there is no room above.
+/// @pre the value lies on the axis.
+void drawLevel(Svg& svg, const Panel& panel, const Axis& y, double value, const std::string& name);
 
 /// groups[g].values[s] is the bar of series s in group g; NaN leaves it out, with a cross in its place.
 struct BarGroup {

@@ -115,6 +115,9 @@ TEST(DrillTradeoffPage, HoldsEveryRowAndNamesItsCharts) {
   const std::regex chart("<svg [^>]*role=\"img\" aria-label=\"[^\"]{20,}\"");
   EXPECT_EQ(std::distance(std::sregex_iterator(page.begin(), page.end(), chart), std::sregex_iterator()), 6);
   EXPECT_NE(page.find("tabindex=\"0\""), std::string::npos) << "a wide table scrolls by keyboard";
+  for (const char* spacing : {"0.4", "0.1"}) {
+    EXPECT_NE(page.find(std::string(">") + spacing + "</text>"), std::string::npos) << "a tick at what was measured";
+  }
   EXPECT_EQ(page.find("nan"), std::string::npos) << "the ripple that is 0 has no logarithm, and is left out";
   EXPECT_NE(page.find("<td>1</td><td>1.5</td><td>1.2</td><td>17</td><td>160</td><td>4711</td>"), std::string::npos)
       << "single over double: 1.5 times the median, 1.2 times the p99.9";
@@ -141,6 +144,12 @@ TEST(DrillTradeoff, RefusesWhatItCannotMeasureBeforeItRuns) {
   const auto large = drillTradeoff(job, {});
   ASSERT_FALSE(large.has_value());
   EXPECT_EQ(large.error().code, ErrorCode::Limit);
+  job = {}, job.html = "no/such/folder/page.html";
+  const auto nowhere = drillTradeoff(job, {});
+  ASSERT_FALSE(nowhere.has_value());
+  EXPECT_EQ(nowhere.error().message, "trade-off: cannot write no/such/folder/page.html: there is no such folder");
+  job.html = ".";
+  EXPECT_FALSE(drillTradeoff(job, {}).has_value()) << "a folder";
   EXPECT_NE(large.error().message.find("spacing 0.01 mm"), std::string::npos) << large.error().message;
 }
 

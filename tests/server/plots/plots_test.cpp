@@ -81,6 +81,30 @@ TEST(Charts, PutPointsWhereTheAxesSay) {
   EXPECT_NE(page.find(">title<"), std::string::npos);
 }
 
+TEST(Charts, NameALevelInsideThePanelWhereverItLies) {
+  const Panel panel{{50, 20}, 300, 200, "title"};
+  const Axis y{"us", 0, 2, false};
+  for (const double value : {0.0, 0.01, 1.0, 1.9, 1.99, 2.0}) {
+    Svg svg(400, 300);
+    drawLevel(svg, panel, y, value, "as much as may be");
+    const std::string page = svg.str();
+    std::smatch line, name;
+    ASSERT_TRUE(std::regex_search(page, line, std::regex("<line [^>]*y1=\"([0-9.]+)\"")));
+    ASSERT_TRUE(std::regex_search(page, name, std::regex("<text [^>]*y=\"([0-9.]+)\"[^>]*>as much as may be<")));
+    const double at = std::stod(line[1]), base = std::stod(name[1]);
+    EXPECT_NEAR(at, 220 - 100 * value, 0.01);
+    EXPECT_GT(base - 11, 20) << "letters of 11 px stay below the frame's upper edge, at " << value;
+    EXPECT_LT(base, 220) << value;
+    EXPECT_TRUE(base < at || base - 11 > at) << "the line crosses no letter, at " << value;
+  }
+}
+
+TEST(Charts, TakeTheTicksThatAreAskedFor) {
+  Axis axis = axisFor("spacing, mm", {0.4, 0.025}, true, false);
+  axis.ticks = {0.025, 0.4};
+  EXPECT_EQ(ticksOf(axis), (std::vector<double>{0.025, 0.4}));
+}
+
 TEST(Charts, ABarThatIsNotThereLeavesItsPlaceEmpty) {
   const Panel panel{{50, 20}, 300, 200, ""};
   const Axis y{"mm", 0, 2, false};
