@@ -11,8 +11,16 @@ namespace {
 
 constexpr auto kRedrawEvery = std::chrono::milliseconds(100);
 
+constexpr std::size_t kMostShown = 12;  // values of a list on one line
+
 std::string shown(const jobs::Figures& value) {
   if (value.is_string()) return value.get<std::string>();
+  if (value.is_array() && value.size() > kMostShown) {
+    const jobs::Figures first(value.begin(), value.begin() + kMostShown);
+    std::string text = shown(first);
+    text.back() = ',';
+    return text + "... " + std::to_string(value.size()) + " in all]";
+  }
   return value.dump(-1, ' ', false, jobs::Figures::error_handler_t::replace);
 }
 

@@ -10,7 +10,7 @@
 
 namespace spinaltap::cli {
 
-/// With `json`, exactly one object on one line; else a line a figure.
+/// With `json`, exactly one object on one line; else a line a figure, long lists cut short.
 void print(const jobs::Figures& figures, bool json);
 /// "spinaltap: message", one line whatever the message holds.
 void printError(std::string_view message);

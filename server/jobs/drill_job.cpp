@@ -35,6 +35,7 @@ class Kept {
 
 struct Run {
   std::uint64_t cycles = 0, refused = 0, inputs = 0, hash = 0;
+  bool behind = false;
   double step_s = 0;
 };
 
@@ -61,6 +62,7 @@ Result<Run> run(session::Session& session, const DrillJob& job, std::uint64_t in
     if (output.status == session::Status::Ok) {
       accumulator.add({input.t_us, input.tip_mm, input.axis, input.spinning, output.thrust_N, removed});
       result.cycles = output.cycle;
+      result.behind = output.behind;
     } else {
       ++result.refused;
     }
@@ -83,6 +85,7 @@ Figures describeRun(const DrillSite& site, const DrillJob& job, const point_volu
   figures["discs"] = lattice.discs;
   figures["cycles"] = run.cycles;
   figures["refused"] = run.refused;
+  figures["behind"] = run.behind;
   figures["hash"] = hex(run.hash);
   return figures;
 }

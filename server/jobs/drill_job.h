@@ -39,7 +39,7 @@ struct DrillJob {
 };
 
 /// Figures: case_id, path_id (of a case), engine, scene or trace_poses, points, points_alive, discs, cycles, refused,
-/// hash, the metrics (core/metrics/metrics.h), step_us_mean, total_s, recording_id (when kept).
+/// behind, hash, the metrics (core/metrics/metrics.h), step_us_mean, total_s, recording_id (when kept).
 /// @param store  may be null when job.keep is false.
 /// @error NotFound (engine), Limit (cycles), Io.
 [[nodiscard]] Result<Figures> drill(store::Store* store, DrillSite site, const DrillJob& job, const Progress& progress);

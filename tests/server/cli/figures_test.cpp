@@ -6,6 +6,7 @@
 #include <regex>
 #include <set>
 
+#include "core/recording/recording.h"
 #include "tests/server/program.h"
 #include "tests/server/temporary_folder.h"
 
@@ -228,7 +229,70 @@ TEST(DrillScene, CountsRefusedPosesAndGoesOn) {
   EXPECT_EQ(figures["refused"], 3);
 }
 
-TEST(Replay, OfAChangedRecordingIsNotVerifiedAndEndsWithOne) {
+TEST(DrillScene, SaysWhetherTheWayBetweenTheLastPosesIsCutToItsEnd) {
+  const TemporaryFolder folder;
+  const std::string trace = (folder.path() / "jump.csv").string();
+  const std::string jump = "0,0,0,1,0,0,1\n1000,0,0,20,0,0,1\n";
+  std::ofstream(trace) << jump;
+  EXPECT_EQ(run({"drill", "--volume", "report", "--trace", trace, "--json"}).json()["behind"], true)
+      << "19 mm in a cycle";
+  std::ofstream rested(trace);
+  rested << jump;
+  for (int t_ms = 2; t_ms < 10; ++t_ms) rested << 1000 * t_ms << ",0,0,20,0,0,1\n";
+  rested.close();
+  EXPECT_EQ(run({"drill", "--volume", "report", "--trace", trace, "--json"}).json()["behind"], false);
+}
+
+/// The recording of `file` with one pose moved aside, and sums and hashes as they were: whole, but not true.
+void movePose(const std::string& file, std::size_t which, double aside_mm) {
+  std::ifstream in(file, std::ios::binary);
+  const std::vector<char> bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const recording::Recording before = recording::read(std::as_bytes(std::span(bytes))).value();
+  std::ofstream out(file, std::ios::binary);
+  const auto sink = [&](std::span<const std::byte> part) {
+    return static_cast<bool>(
+        out.write(reinterpret_cast<const char*>(part.data()), static_cast<std::streamsize>(part.size())));
+  };
+  auto writer = recording::Writer::begin(before.header, before.volume, sink).value();
+  auto session = session::Session::create(before.volume, before.header.config).value();
+  for (std::size_t i = 0; i < before.inputs.size(); ++i) {
+    std::vector<std::uint32_t> removed;
+    const session::Output output = session.step(before.inputs[i], [&](std::span<const std::uint32_t> some) {
+      removed.insert(removed.end(), some.begin(), some.end());
+    });
+    session::Input input = before.inputs[i];
+    if (i == which) input.tip_mm.x += aside_mm;
+    ASSERT_TRUE(writer.append(input, output, removed, session.volume()).has_value());
+  }
+  ASSERT_TRUE(writer.finish().has_value());
+}
+
+TEST(Replay, OfAMovedPoseEndsWithOneAndNamesTheCycleAndTheDiscs) {
+  const TemporaryFolder folder;
+  const std::string file = (folder.path() / "off.rec").string();
+  ASSERT_EQ(run({"drill", "--volume", "report", "--scene", "off", "--cycles", "1500", "--out", file}).code, 0);
+  movePose(file, 700, 0.5);
+  const auto finished = run({"replay", file, "--json"});
+  EXPECT_EQ(finished.code, 1);
+  EXPECT_EQ(finished.err, "") << "it did what was asked; the finding is the answer";
+  const Json figures = finished.json();
+  expectDocumented("replay", figures);
+  EXPECT_EQ(figures["verified"], false);
+  EXPECT_EQ(figures["complete"], true);
+  EXPECT_EQ(figures["first_difference"], 701);
+  // At cycle 701 the tip is 7 mm deep.
+  ASSERT_FALSE(figures["discs"].empty());
+  EXPECT_LE(figures["discs"].back(), 71);
+  const std::string finding = figures["finding"];
+  EXPECT_EQ(finding.rfind("not verified: differs first at cycle 701, on disc", 0), 0U) << finding;
+  const auto shown = run({"replay", file});
+  EXPECT_EQ(shown.code, 1);
+  EXPECT_NE(shown.out.find(finding + "\n"), std::string::npos);
+  const std::string lists = std::to_string(figures["discs"].size()) + " in all]";
+  EXPECT_EQ(shown.out.find(lists) != std::string::npos, figures["discs"].size() > 12) << shown.out;
+}
+
+TEST(Replay, OfACutRecordingVerifiesWhatIsLeft) {
   const TemporaryFolder folder;
   const std::string file = (folder.path() / "on.rec").string();
   ASSERT_EQ(run({"drill", "--volume", "report", "--scene", "on", "--cycles", "1500", "--out", file}).code, 0);
