@@ -117,7 +117,7 @@ std::string drawn(const Chart& chart) {
          "</figcaption>\n</figure>\n";
 }
 
-/// One line for each setting that differs in what `by` tells apart.
+/// One line for each setting that differs in what is told apart, by spacing.
 std::vector<Line> linesOf(const Figures& rows, const char* key, bool by_precision, bool by_threads) {
   std::vector<Line> lines;
   for (const Figures& row : rows) {
@@ -136,6 +136,7 @@ std::vector<Line> linesOf(const Figures& rows, const char* key, bool by_precisio
         std::any_of(line->points.begin(), line->points.end(), [&](const plots::Place& p) { return p[0] == x; });
     if (!there && y > 0) line->points.push_back({x, y});
   }
+  for (Line& line : lines) std::sort(line.points.begin(), line.points.end());  // asked for in any order
   return lines;
 }
 

@@ -1,6 +1,7 @@
 // The page of the drill's trade-off, from made-up figures: a file that parses, holds every row, and needs nothing else.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
@@ -121,6 +122,27 @@ TEST(DrillTradeoffPage, HoldsEveryRowAndNamesItsCharts) {
   EXPECT_EQ(page.find("nan"), std::string::npos) << "the ripple that is 0 has no logarithm, and is left out";
   EXPECT_NE(page.find("<td>1</td><td>1.5</td><td>1.2</td><td>17</td><td>160</td><td>4711</td>"), std::string::npos)
       << "single over double: 1.5 times the median, 1.2 times the p99.9";
+}
+
+TEST(DrillTradeoffPage, DrawsTheSameLinesInWhateverOrderSpacingsWereAskedFor) {
+  Figures figures = made(false), turned = made(false);
+  for (Figures* some : {&figures, &turned}) {
+    for (const double spacing : {0.2, 0.05}) {
+      Figures row = (*some)["rows"].front();
+      row["spacing_mm"] = spacing, row["median_us"] = 1 / spacing;
+      (*some)["rows"].push_back(row);
+    }
+  }
+  std::reverse(turned["rows"].begin(), turned["rows"].end());
+  const auto lines = [](const Figures& of) {
+    const std::string page = drillTradeoffPage(of);
+    const std::regex polyline("<polyline[^>]*points=\"[^\"]*\"");
+    std::multiset<std::string> found;
+    for (std::sregex_iterator at(page.begin(), page.end(), polyline), end; at != end; ++at) found.insert(at->str());
+    return found;
+  };
+  EXPECT_GT(lines(figures).size(), 10U);
+  EXPECT_EQ(lines(figures), lines(turned));
 }
 
 TEST(DrillTradeoffTable, HasALineARowAndTheRecommendation) {
