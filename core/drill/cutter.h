@@ -7,6 +7,7 @@
 
 #include "core/drill/engine.h"
 #include "core/drill/predicate.h"
+#include "core/drill/simd_hand_out.h"
 #include "core/point_volume/lattice.h"
 
 namespace spinaltap::drill {
@@ -45,13 +46,21 @@ class Cutter {
   /// True when the point was alive and is now removed. @pre as cut().
   bool cutOne(std::uint32_t index, int disc) {
     const std::uint64_t bits = volume_.alive[index >> 6] & (std::uint64_t{1} << (index & 63));
-    const std::uint64_t gone =
-        insideOf(index >> 6, bits, static_cast<std::uint32_t>(disc) * per_disc_, volume_.lattice.discZ_mm(disc));
-    remove(index >> 6, gone);
-    return gone != 0;
+    if (insideOf(index >> 6, bits, static_cast<std::uint32_t>(disc) * per_disc_, volume_.lattice.discZ_mm(disc)) == 0) {
+      return false;
+    }
+    takeOne(index);
+    return true;
   }
 
-  void takeOne(std::uint32_t index) { remove(index >> 6, std::uint64_t{1} << (index & 63)); }
+  /// Removes a point without a test. @pre it is alive, and the predicate would put it inside.
+  void takeOne(std::uint32_t index) {
+    kill(index >> 6, std::uint64_t{1} << (index & 63));
+    makeRoom(1);
+    indices_[held_++] = index;
+    ++removal_.count;
+    removal_.density_sum_mg_cm3 += volume_.density_mg_cm3[index];
+  }
 
   [[nodiscard]] Removal finish() {
     flush();
@@ -94,31 +103,28 @@ class Cutter {
   /// @pre the points of `gone` are alive.
   void remove(std::uint32_t word, std::uint64_t gone) {
     if (gone == 0) return;
+    if (word + 2 >= volume_.alive.size()) {  // densities end with the last point
+      for (; gone != 0; gone &= gone - 1) takeOne((word << 6) + static_cast<std::uint32_t>(__builtin_ctzll(gone)));
+      return;
+    }
+    kill(word, gone);
+    makeRoom(128);
+    const HandedOut out =
+        handOut(gone, word << 6, volume_.density_mg_cm3.data() + (word << 6), indices_.data() + held_);
+    held_ += out.count;
+    removal_.count += out.count;
+    removal_.density_sum_mg_cm3 += out.density_sum;
+  }
+
+  void kill(std::uint32_t word, std::uint64_t gone) {
     std::uint64_t& alive = volume_.alive[word];
     removal_.hash_delta -= point_volume::wordHash(word, alive);
     alive &= ~gone;
     removal_.hash_delta += point_volume::wordHash(word, alive);
-    if (held_ + 64 > indices_.size()) flush();
-    const std::uint32_t first = word << 6;
-    std::uint32_t* to = indices_.data() + held_;
-    const std::uint16_t* density = volume_.density_mg_cm3.data() + first;
-    std::uint64_t sum = 0;
-    if (gone == ~std::uint64_t{0}) {  // loops that vectorise
-      for (std::uint32_t i = 0; i < 64; ++i) *to++ = first + i;
-      std::uint32_t whole = 0;
-      for (std::uint32_t i = 0; i < 64; ++i) whole += density[i];
-      sum = whole;
-    } else {
-      for (; gone != 0; gone &= gone - 1) {
-        const auto i = static_cast<std::uint32_t>(__builtin_ctzll(gone));
-        *to++ = first + i;
-        sum += density[i];
-      }
-    }
-    const auto held = static_cast<std::uint32_t>(to - indices_.data());
-    removal_.density_sum_mg_cm3 += sum;
-    removal_.count += held - held_;
-    held_ = held;
+  }
+
+  void makeRoom(std::size_t count) {
+    if (held_ + count > indices_.size()) flush();
   }
 
   void flush() {
@@ -133,7 +139,7 @@ class Cutter {
   std::uint32_t per_disc_;
   Removal removal_;
   std::uint32_t held_ = 0;
-  std::array<std::uint32_t, 256> indices_;
+  std::array<std::uint32_t, 512> indices_;
 };
 
 /// Cuts what the bit can reach on discs first .. last, whatever its pose (bounds.h). In double precision.
