@@ -34,7 +34,7 @@ constexpr double kFar = 1e18;  // squared mm, and finite as a single
 // Fewer discs than that are not worth sharing.
 constexpr int kLeastShared = 3 * static_cast<int>(kPadding);
 
-// After so many points taken from a ring in a row, the rest of the arc is taken at once.
+// After so many points taken one by one from a ring, the rest of the arc is taken at once.
 constexpr int kLongWalk = 3;
 
 double squared(double x) { return x * x; }
@@ -102,7 +102,8 @@ class Clearance final : public Engine {
   struct Disc {
     int disc;
     Section section;
-    float turn;  ///< the direction of the section's centre
+    double away;  ///< of the section's centre from the path
+    float turn;   ///< and its direction
   };
 
   /// Steps discs first .. last.
@@ -137,7 +138,8 @@ class Clearance final : public Engine {
 
   void visit(Cutter& cutter, const Sections& sections, const Touched& touched) {
     const int disc = touched.disc, rings = cutter.volume().lattice.rings;
-    const Disc at{disc, sections.at(disc, touched.about), touched.turn};
+    const Section section = sections.at(disc, touched.about);
+    const Disc at{disc, section, section.away_mm(), touched.turn};
     double nearest = touched.beyond_mm2;
     if (touched.whole >= known_.first_ring[disc]) nearest = std::min(nearest, cutWhole(cutter, at, touched.whole));
     for (std::uint64_t bits = touched.rings; bits != 0; bits &= bits - 1) {
@@ -152,7 +154,7 @@ class Clearance final : public Engine {
   double cutWhole(Cutter& cutter, const Disc& at, int whole) {
     const Lattice& lattice = cutter.volume().lattice;
     std::uint16_t& first = known_.first_ring[at.disc];
-    const int sure = heldFloor((at.section.inner_mm - at.section.away_mm()) / lattice.spacing_mm, whole);
+    const int sure = heldFloor((at.section.inner_mm - at.away) / lattice.spacing_mm, whole);
     const int split = std::max<int>(first, sure + 1);
     cutter.take(at.disc, Lattice::ringStart(first), Lattice::ringStart(split));
     cutter.cut(at.disc, Lattice::ringStart(split), Lattice::ringStart(whole + 1));
@@ -168,53 +170,69 @@ class Clearance final : public Engine {
     return ring;
   }
 
-  /// Walks from the centre's direction to both sides, and returns the squared distance of the nearest that stays alive.
-  double cutRing(Cutter& cutter, const Disc& at, int ring) {
-    const std::size_t gap = known_.gap(at.disc, ring);
-    const int slots = Lattice::slotsOf(ring), half = slots / 2;
-    const int below = std::min(static_cast<int>(at.turn * static_cast<float>(slots)), slots - 1);
-    const auto slotAt = [&](int offset) {
+  /// A ring of a disc, its slots counted from the one at or just below the direction of the section's centre.
+  struct Ring {
+    int ring, slots, below;
+    std::uint32_t in_disc, start;  ///< where it begins in its disc, and in the volume
+
+    [[nodiscard]] int slotAt(int offset) const {
       const int slot = below + offset;
       return slot < 0 ? slot + slots : slot >= slots ? slot - slots : slot;
-    };
-    // In a gap, the walk begins at its ends.
-    const int low = gap_low_[gap], past = below >= low ? below - low : below - low + slots;
-    const int between = gap_high_[gap] - low, width = between > 0 ? between : between + slots;
-    const bool in_gap = past < width;
-    double nearest = kFar;
+    }
+  };
+
+  /// Walks from the centre's direction to both sides, and returns the squared distance of the nearest that stays alive.
+  double cutRing(Cutter& cutter, const Disc& at, int number) {
+    const std::size_t gap = known_.gap(at.disc, number);
+    const int slots = Lattice::slotsOf(number), half = slots / 2;
+    const std::uint32_t in_disc = Lattice::ringStart(number);
+    const Ring ring{number, slots, std::min(static_cast<int>(at.turn * static_cast<float>(slots)), slots - 1), in_disc,
+                    static_cast<std::uint32_t>(at.disc) * cutter.volume().lattice.pointsPerDisc() + in_disc};
     const int up_end = half + 1, down_end = -half;  // between them, every slot of the ring once
-    const int up = walk(cutter, at, ring, in_gap ? std::min(width - past, up_end) : 1, up_end, nearest, slotAt);
-    const int down = walk(cutter, at, ring, in_gap ? std::max(-past, down_end) : 0, down_end, nearest, slotAt);
+    int up = 1, down = 0;
+    // In a gap, the walk begins at its ends; else what is sure to go is taken at once.
+    const int low = gap_low_[gap], past = ring.below >= low ? ring.below - low : ring.below - low + slots;
+    const int between = gap_high_[gap] - low, width = between > 0 ? between : between + slots;
+    if (past < width) {
+      up = std::min(width - past, up_end), down = std::max(-past, down_end);
+    } else if (const int sure = std::min(sureSlots(cutter, at, number), half - 1); sure >= 0) {
+      takeSlots(cutter, at, ring, -sure, sure);
+      up = sure + 1, down = -sure - 1;
+    }
+    double nearest = kFar;
+    up = walk(cutter, at, ring, up, up_end, nearest);
+    down = walk(cutter, at, ring, down, down_end, nearest);
     // A dead ring's gap is all but one slot, and that one lies opposite.
     const bool dead = up == up_end && down == down_end;
-    gap_low_[gap] = static_cast<Slot>(slotAt(dead ? half : down));
-    gap_high_[gap] = static_cast<Slot>(slotAt(dead ? half : up));
+    gap_low_[gap] = static_cast<Slot>(ring.slotAt(dead ? half : down));
+    gap_high_[gap] = static_cast<Slot>(ring.slotAt(dead ? half : up));
     return nearest;
   }
 
   /// From one offset towards another, that one excluded; returns the offset of the first point that stays alive, or
   /// `to`.
-  template <class SlotAt>
-  int walk(Cutter& cutter, const Disc& at, int ring, int from, int to, double& nearest, const SlotAt& slotAt) {
-    const PointVolume& volume = cutter.volume();
-    const std::uint32_t in_disc = Lattice::ringStart(ring);
-    const std::uint32_t start = static_cast<std::uint32_t>(at.disc) * volume.lattice.pointsPerDisc() + in_disc;
+  int walk(Cutter& cutter, const Disc& at, const Ring& ring, int from, int to, double& nearest) {
     const double outer = squared(at.section.outer_mm);
     const double inner = at.section.inner_mm > 0 ? squared(at.section.inner_mm) : -1.0;
     const int step = to > from ? 1 : -1;
     int first = to, taken = 0;
     for (int offset = from; offset != to; offset += step) {
-      const auto slot = static_cast<std::uint32_t>(slotAt(offset));
-      if (!volume.isAlive(start + slot)) continue;
-      const double distance = squared(tools_.table.x_mm[in_disc + slot] - at.section.x_mm) +
-                              squared(tools_.table.y_mm[in_disc + slot] - at.section.y_mm);
+      const auto slot = static_cast<std::uint32_t>(ring.slotAt(offset));
+      if (!cutter.volume().isAlive(ring.start + slot)) continue;
+      const double distance = squared(tools_.table.x_mm[ring.in_disc + slot] - at.section.x_mm) +
+                              squared(tools_.table.y_mm[ring.in_disc + slot] - at.section.y_mm);
       if (distance <= outer) {
         if (distance <= inner) {
-          cutter.takeOne(start + slot);
-          if (++taken == kLongWalk) offset = takeArc(cutter, at, ring, offset, to, slotAt);
+          cutter.takeOne(ring.start + slot);
+          if (++taken != kLongWalk) continue;
+          const int sure = sureSlots(cutter, at, ring.ring), next = offset + step;
+          const int last = step > 0 ? std::min(sure, to - 1) : std::max(-sure, to + 1);
+          if ((last - next) * step < 0) continue;
+          takeSlots(cutter, at, ring, std::min(next, last), std::max(next, last));
+          offset = last;
           continue;
         }
-        if (cutter.cutOne(start + slot, at.disc)) continue;
+        if (cutter.cutOne(ring.start + slot, at.disc)) continue;
       }
       nearest = std::min(nearest, distance);
       if (first == to) first = offset;
@@ -223,33 +241,33 @@ class Clearance final : public Engine {
     return first;
   }
 
-  /// Takes what lies between an offset and the end of the arc inside the inner circle, or `to`; returns the last
-  /// offset.
-  template <class SlotAt>
-  int takeArc(Cutter& cutter, const Disc& at, int ring, int offset, int to, const SlotAt& slotAt) {
-    const Section& section = at.section;
-    const double radius = ring * cutter.volume().lattice.spacing_mm;
-    const double away = section.away_mm();
-    const double cosine = (squared(away) + squared(radius) - squared(section.inner_mm)) / (2 * away * radius);
-    if (!(cosine < 1.0)) return offset;
+  /// Offsets -n .. n of a ring lie in the inner circle for sure; negative when too few do to be worth the trouble.
+  static int sureSlots(const Cutter& cutter, const Disc& at, int ring) {
+    const double spacing = cutter.volume().lattice.spacing_mm, radius = ring * spacing;
+    const double away = at.away, inner = std::max(0.0, at.section.inner_mm);
+    // Cosine rule: the circle reaches the angle t from the centre's direction where 4 r d sin^2(t / 2) is this. There
+    // are 6 / (2 pi) slots to a spacing.
+    const double room = squared(inner) - squared(radius - away);
+    if (!(room * radius > squared(kLongWalk * spacing) * away)) return -1;
+    const double cosine = 1.0 - room / (2 * away * radius);
     const double half_arc = (cosine > -1.0 ? roughArcCos(cosine) : kPi) - 3 * kAngleError_rad;
     // The direction of the centre lies within a slot above offset 0.
-    const int slots = Lattice::slotsOf(ring), step = to > offset ? 1 : -1;
-    const int sure = static_cast<int>(half_arc * (slots / (2 * kPi))) - 1;
-    const int last = step > 0 ? std::min(sure, to - 1) : std::max(-sure, to + 1);
-    if ((last - offset) * step <= 0) return offset;
-    const int low = slotAt(std::min(offset + step, last)), high = slotAt(std::max(offset + step, last));
-    const std::uint32_t start = Lattice::ringStart(ring);
+    return static_cast<int>(half_arc * (Lattice::slotsOf(ring) / (2 * kPi))) - 1;
+  }
+
+  /// Takes what is alive from one offset up to another.
+  static void takeSlots(Cutter& cutter, const Disc& at, const Ring& ring, int first, int last) {
+    const int low = ring.slotAt(first), high = ring.slotAt(last);
     const auto take = [&](int begin, int end) {
-      cutter.take(at.disc, start + static_cast<std::uint32_t>(begin), start + static_cast<std::uint32_t>(end));
+      cutter.take(at.disc, ring.in_disc + static_cast<std::uint32_t>(begin),
+                  ring.in_disc + static_cast<std::uint32_t>(end));
     };
     if (low <= high) {
       take(low, high + 1);
     } else {
-      take(low, slots);
+      take(low, ring.slots);
       take(0, high + 1);
     }
-    return last;
   }
 
   /// The first alive point of begin .. end-1, or end.
