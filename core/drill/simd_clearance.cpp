@@ -127,12 +127,13 @@ HWY_INLINE std::size_t FindDue(const SectionLine& line, const Known<Slot>& known
 }
 
 template <class Slot>
-HWY_INLINE Touched LookAt(const Known<Slot>& known, int disc, const Look& look) {
+HWY_INLINE void LookAt(const Known<Slot>& known, int disc, const Look& look, Touched& touched) {
   const DR d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const RingRange range = ringsNear(known, disc, look);
   const VR reach = hn::Set(d, look.outer_mm * look.outer_mm), end = hn::Set(d, static_cast<float>(range.last));
-  Touched touched{disc, range.whole, range.first, 1 + (range.last - range.first) / 64, 0, 0, look.turn, About::Shaft};
+  const int group = 1 + (range.last - range.first) / 64;
+  std::uint64_t rings = 0;
   VR beyond = hn::Set(d, range.beyond_mm2);
   for (int ring = range.first; ring <= range.last; ring += lanes) {
     const VR squared = Squared(known, known.gap(disc, ring), look, ring);
@@ -140,16 +141,19 @@ HWY_INLINE Touched LookAt(const Known<Slot>& known, int disc, const Look& look) 
     beyond = hn::IfThenElse(hn::AndNot(in_reach, counted), hn::Min(beyond, squared), beyond);
     std::uint64_t bits = 0;  // little-endian on every target; WebAssembly is, too
     hn::StoreMaskBits(d, hn::And(in_reach, counted), reinterpret_cast<std::uint8_t*>(&bits));
-    if (touched.group == 1) {
-      touched.rings |= bits << (ring - range.first);
+    if (group == 1) {
+      rings |= bits << (ring - range.first);
     } else {
       for (; bits != 0; bits &= bits - 1) {
-        touched.rings |= std::uint64_t{1} << ((ring - range.first + __builtin_ctzll(bits)) / touched.group);
+        rings |= std::uint64_t{1} << ((ring - range.first + __builtin_ctzll(bits)) / group);
       }
     }
   }
+  touched.disc = disc;
+  touched.whole = range.whole, touched.first = range.first;
+  touched.group = group, touched.rings = rings;
   touched.beyond_mm2 = hn::GetLane(hn::MinOfLanes(d, beyond));
-  return touched;
+  touched.turn = look.turn;
 }
 
 template <class Slot>
@@ -159,7 +163,7 @@ HWY_INLINE int FindTouched(const SectionLine& line, const Known<Slot>& known, in
   const std::size_t found = FindDue(line, known, first, count, due);
   int cut = 0;
   for (std::size_t n = 0; n < found; ++n) {
-    touched[cut] = LookAt(known, due.disc[n], {due.outer[n], due.away[n], due.turn[n]});
+    LookAt(known, due.disc[n], {due.outer[n], due.away[n], due.turn[n]}, touched[cut]);
     touched[cut].about = line.about(due.outer[n]);
     due.radius[n] = touched[cut].beyond_mm2;
     cut += touched[cut].rings != 0 || touched[cut].whole >= known.first_ring[due.disc[n]];
