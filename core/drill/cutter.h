@@ -1,6 +1,7 @@
 // core/drill/cutter.h - what every engine does to the points it has chosen: test the alive ones, remove those inside.
 // Private to core/drill.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -40,7 +41,16 @@ class Cutter {
   /// Removes the alive ones of such points without a test. @pre the predicate would put them all inside.
   void take(int disc, std::uint32_t begin, std::uint32_t end) {
     const std::uint32_t base = static_cast<std::uint32_t>(disc) * per_disc_;
-    forWords(base + begin, base + end, [&](std::uint32_t word, std::uint64_t bits) { remove(word, bits); });
+    std::uint32_t first = base + begin, next = first;  // points that are gone, and not yet handed out
+    forWords(base + begin, base + end, [&](std::uint32_t word, std::uint64_t bits) {
+      const auto low = (word << 6) + static_cast<std::uint32_t>(__builtin_ctzll(bits));
+      const std::uint64_t row = bits >> (low & 63);
+      if ((row & (row + 1)) != 0) return remove(word, bits);
+      kill(word, bits);
+      if (low != next) handOutRow(first, next), first = low;
+      next = (word << 6) + 64 - static_cast<std::uint32_t>(__builtin_clzll(bits));
+    });
+    handOutRow(first, next);
   }
 
   /// True when the point was alive and is now removed. @pre as cut().
@@ -114,6 +124,23 @@ class Cutter {
     held_ += out.count;
     removal_.count += out.count;
     removal_.density_sum_mg_cm3 += out.density_sum;
+  }
+
+  void handOutRow(std::uint32_t first, std::uint32_t end) {
+    while (first < end) {
+      makeRoom(indices_.size() / 2);
+      const auto room = static_cast<std::uint32_t>(indices_.size() / 2 - 64);
+      const std::uint32_t count = std::min(end - first, room);
+      const bool at_end = first + count + 64 > volume_.density_mg_cm3.size();
+      const std::uint16_t* density = volume_.density_mg_cm3.data() + first;
+      std::uint32_t* to = indices_.data() + held_;
+      if (at_end) {
+        for (std::uint32_t i = 0; i < count; ++i) to[i] = first + i, removal_.density_sum_mg_cm3 += density[i];
+      } else {
+        removal_.density_sum_mg_cm3 += drill::handOutRow(count, first, density, to);
+      }
+      held_ += count, removal_.count += count, first += count;
+    }
   }
 
   void kill(std::uint32_t word, std::uint64_t gone) {

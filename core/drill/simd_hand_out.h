@@ -13,4 +13,9 @@ struct HandedOut {
 [[nodiscard]] HandedOut handOut(std::uint64_t bits, std::uint32_t first, const std::uint16_t* density,
                                 std::uint32_t* to);
 
+/// The same of `count` points in a row: writes first, first + 1, .. and adds up density[0 .. count-1].
+/// @pre 64 more of either can be read or written; count < 65536.
+[[nodiscard]] std::uint32_t handOutRow(std::uint32_t count, std::uint32_t first, const std::uint16_t* density,
+                                       std::uint32_t* to);
+
 }  // namespace spinaltap::drill

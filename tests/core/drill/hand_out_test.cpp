@@ -47,5 +47,23 @@ TEST(HandOut, SaysTheSameAsBitByBit) {
   }
 }
 
+TEST(HandOut, SaysOfARowWhatItSaysBitByBit) {
+  Random random(20261123);
+  for (int round = 0; round < 5000; ++round) {
+    const auto count = static_cast<std::uint32_t>(random.below(300)), first = static_cast<std::uint32_t>(round);
+    std::vector<std::uint16_t> density(count + 64);
+    for (auto& value : density) value = static_cast<std::uint16_t>(65535 - random.below(3));
+    std::vector<std::uint32_t> to(count + 64), expected;
+    std::uint64_t sum = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      expected.push_back(first + i);
+      sum += density[i];
+    }
+    ASSERT_EQ(handOutRow(count, first, density.data(), to.data()), sum) << "seed 20261123, round " << round;
+    to.resize(count);
+    ASSERT_EQ(to, expected) << "round " << round;
+  }
+}
+
 }  // namespace
 }  // namespace spinaltap::drill
