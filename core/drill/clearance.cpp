@@ -195,9 +195,9 @@ class Clearance final : public Engine {
     const int between = gap_high_[gap] - low, width = between > 0 ? between : between + slots;
     if (past < width) {
       up = std::min(width - past, up_end), down = std::max(-past, down_end);
-    } else if (const int sure = std::min(sureSlots(cutter, at, number), half - 1); sure >= 0) {
-      takeSlots(cutter, at, ring, -sure, sure);
-      up = sure + 1, down = -sure - 1;
+    } else if (const Arc sure = sureArc(cutter, at, ring); sure.first <= sure.last) {
+      takeSlots(cutter, at, ring, sure.first, sure.last);
+      up = std::max(sure.last + 1, up), down = std::min(sure.first - 1, down);
     }
     double nearest = kFar;
     up = walk(cutter, at, ring, up, up_end, nearest);
@@ -225,8 +225,8 @@ class Clearance final : public Engine {
         if (distance <= inner) {
           cutter.takeOne(ring.start + slot);
           if (++taken != kLongWalk) continue;
-          const int sure = sureSlots(cutter, at, ring.ring), next = offset + step;
-          const int last = step > 0 ? std::min(sure, to - 1) : std::max(-sure, to + 1);
+          const Arc sure = sureArc(cutter, at, ring);
+          const int next = offset + step, last = step > 0 ? std::min(sure.last, to - 1) : std::max(sure.first, to + 1);
           if ((last - next) * step < 0) continue;
           takeSlots(cutter, at, ring, std::min(next, last), std::max(next, last));
           offset = last;
@@ -241,18 +241,28 @@ class Clearance final : public Engine {
     return first;
   }
 
-  /// Offsets -n .. n of a ring lie in the inner circle for sure; negative when too few do to be worth the trouble.
-  static int sureSlots(const Cutter& cutter, const Disc& at, int ring) {
-    const double spacing = cutter.volume().lattice.spacing_mm, radius = ring * spacing;
-    const double away = at.away, inner = std::max(0.0, at.section.inner_mm);
+  /// Offsets first .. last of a ring; none when first > last.
+  struct Arc {
+    int first, last;
+  };
+
+  /// What lies in the inner circle for sure; none when too few do to be worth the trouble.
+  Arc sureArc(const Cutter& cutter, const Disc& at, const Ring& ring) const {
+    const double spacing = cutter.volume().lattice.spacing_mm, radius = ring.ring * spacing;
+    // `turn` is of a centre in single precision, and rounded.
+    const double away = at.away, inner = std::max(0.0, at.section.inner_mm - 3.0 * known_.margin_mm);
     // Cosine rule: the circle reaches the angle t from the centre's direction where 4 r d sin^2(t / 2) is this. There
     // are 6 / (2 pi) slots to a spacing.
     const double room = squared(inner) - squared(radius - away);
-    if (!(room * radius > squared(kLongWalk * spacing) * away)) return -1;
+    if (!(room * radius > squared(kLongWalk * spacing) * away)) return {1, 0};
     const double cosine = 1.0 - room / (2 * away * radius);
     const double half_arc = (cosine > -1.0 ? roughArcCos(cosine) : kPi) - 3 * kAngleError_rad;
-    // The direction of the centre lies within a slot above offset 0.
-    return static_cast<int>(half_arc * (Lattice::slotsOf(ring) / (2 * kPi))) - 1;
+    // In slots, and where in its slot the direction is: past offset 0.
+    const double reach = half_arc * (ring.slots / (2 * kPi)),
+                 past = at.turn * static_cast<float>(ring.slots) - ring.below;
+    const int half = ring.slots / 2;  // truncation is the floor of what is above -1, plus one
+    return {std::max(1 - static_cast<int>(reach - past + 1.0), 1 - half),
+            std::min(static_cast<int>(reach + past), half)};
   }
 
   /// Takes what is alive from one offset up to another.
