@@ -12,15 +12,16 @@ namespace {
 /// Runs of all lengths, single bits, and the ends of the word.
 std::uint64_t randomWord(Random& random) {
   const auto run = [&] { return (~std::uint64_t{0} >> random.below(64)) << random.below(64); };
+  const std::uint64_t a = run(), b = run(), c = run();
   switch (random.below(4)) {
     case 0:
-      return run();
+      return a;
     case 1:
-      return run() ^ run();
+      return a ^ b;
     case 2:
-      return run() & (run() ^ run());
+      return a & (b ^ c);
     default:
-      return (run() ^ run()) & ~(run() & run());
+      return (a ^ b) & c & (c >> 1 | b << 2);
   }
 }
 
