@@ -1,36 +1,13 @@
 // The reference's removed set, from a few points: only the discs that the bit can reach, on each disc only the rings
 // that its section can reach, on each ring only the slots that it can. The bounds are derived in bounds.h.
-#include <algorithm>
-#include <cmath>
-
-#include "core/drill/bounds.h"
 #include "core/drill/cutter.h"
+#include "core/drill/probe.h"
+#include "core/drill/reachable.h"
 
 namespace spinaltap::drill {
 namespace {
 
 using point_volume::Lattice;
-
-void cutRing(Cutter& cutter, int disc, int ring, const PolarCircle& section, double spacing_mm) {
-  const std::uint32_t start = Lattice::ringStart(ring);
-  if (ring == 0) return cutter.cut(disc, 0, 1);
-  const SlotRange range = slotsInside(section, ring, spacing_mm);
-  const int slots = Lattice::slotsOf(ring), end = range.first + range.count;
-  const auto at = [start](int slot) { return start + static_cast<std::uint32_t>(slot); };
-  if (end > slots) cutter.cut(disc, at(0), at(end - slots));
-  cutter.cut(disc, at(range.first), at(std::min(end, slots)));
-}
-
-void cutDisc(Cutter& cutter, const Lattice& lattice, int disc, const PolarCircle& section) {
-  const double spacing = lattice.spacing_mm, d = section.distance_mm, radius = section.radius_mm;
-  const int outermost = lattice.rings - 1;
-  // Rings wholly inside the circle are one run of points.
-  const int whole = heldFloor((radius - d) / spacing, outermost);
-  if (whole >= 0) cutter.cut(disc, 0, Lattice::ringStart(whole + 1));
-  const int first = std::max(whole + 1, heldCeil((d - radius) / spacing, outermost + 1));
-  const int last = heldFloor((d + radius) / spacing, outermost);
-  for (int ring = first; ring <= last; ++ring) cutRing(cutter, disc, ring, section, spacing);
-}
 
 class Bounded final : public Engine {
  public:
@@ -54,11 +31,28 @@ class Bounded final : public Engine {
 }  // namespace
 
 void cutReachable(Cutter& cutter, const BitShape& bit, const BitPose& pose, int first, int last) {
-  const Lattice& lattice = cutter.volume().lattice;
-  for (int disc = first; disc <= last; ++disc) {
-    const Circle section = sectionCircle(bit, pose, lattice.discZ_mm(disc));
-    if (section.radius_mm >= 0) cutDisc(cutter, lattice, disc, polar(section));
-  }
+  anyReachable(cutter.volume().lattice, bit, pose, {first, last},
+               [&](int disc, std::uint32_t begin, std::uint32_t end) {
+                 cutter.cut(disc, begin, end);
+                 return false;
+               });
+}
+
+bool meetsAlive(const point_volume::PointVolume& volume, const BitShape& bit, const BitPose& pose) {
+  const Lattice& lattice = volume.lattice;
+  const DiscRange reached = discsWithin(reachAlongPath(bit, pose), lattice);
+  return anyReachable(lattice, bit, pose, reached, [&](int disc, std::uint32_t begin, std::uint32_t end) {
+    const std::uint32_t base = static_cast<std::uint32_t>(disc) * lattice.pointsPerDisc();
+    for (std::uint32_t index = base + begin; index < base + end; ++index) {
+      if ((volume.alive[index >> 6] >> (index & 63)) == 0) {
+        index |= 63;  // nothing more in this word
+      } else if (volume.isAlive(index) &&
+                 isInside(bit, pose.tip_mm, pose.axis, point_volume::positionOf(lattice, index))) {
+        return true;
+      }
+    }
+    return false;
+  });
 }
 
 std::unique_ptr<Engine> makeBounded(const point_volume::Lattice& lattice, const plan::Bit& bit) {

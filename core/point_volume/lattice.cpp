@@ -79,6 +79,13 @@ DiscTable discTable(const Lattice& lattice) {
   return table;
 }
 
+Vec3 positionOf(const Lattice& lattice, std::uint32_t index) {
+  const Site site = lattice.site(index);
+  const double radius_mm = static_cast<double>(site.ring) * lattice.spacing_mm;
+  const SinCos direction = sinCosOfTurn(site.slot, Lattice::slotsOf(site.ring));
+  return {radius_mm * direction.cos, radius_mm * direction.sin, lattice.discZ_mm(site.disc)};
+}
+
 double pointVolume_mm3(const Lattice& lattice) {
   return kPi / 3.0 * (lattice.spacing_mm * lattice.spacing_mm * lattice.spacing_mm);
 }

@@ -59,6 +59,9 @@ struct DiscTable {
 };
 [[nodiscard]] DiscTable discTable(const Lattice& lattice);
 
+/// One point, to the bits of discTable. @pre index < points().
+[[nodiscard]] Vec3 positionOf(const Lattice& lattice, std::uint32_t index);
+
 /// The bone that one point stands for: pi/3 * spacing^3, since ring k has 6k points on an annulus of area
 /// 2 pi k spacing^2 (the centre point's share, pi/4, is counted alike).
 [[nodiscard]] double pointVolume_mm3(const Lattice& lattice);
