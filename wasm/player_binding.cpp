@@ -59,8 +59,8 @@ class PlayerBinding {
     const recording::Moment moment = player_.moment(std::max<std::uint64_t>(at, 1));
     val pose = val::object();
     pose.set("t_us", static_cast<double>(moment.input.t_us));
-    pose.set("tip", tripleOf(moment.input.tip_mm));
-    pose.set("axis", tripleOf(normalized(moment.input.axis)));
+    pose.set("tip", tripleOf(moment.bit.tip_mm));
+    pose.set("axis", tripleOf(moment.bit.axis));
     pose.set("spinning", moment.input.spinning);
     pose.set("depth_mm", moment.depth_mm);
     pose.set("thrust_N", at == 0 ? 0.0 : moment.thrust_N);

@@ -56,6 +56,12 @@ Result<SessionBinding::Settings> settingsOf(const val& config, const point_volum
   const Result<plan::Bit> bit = bitIn(config);
   if (!bit) return tl::unexpected(bit.error());
   header.config.bit = *bit;
+  const Result<double> speed = numberIn(config, "speed_rpm", header.config.speed_rpm);
+  if (!speed) return tl::unexpected(speed.error());
+  header.config.speed_rpm = *speed;
+  const Result<double> stiffness = numberIn(config, "stiffness_N_mm", 0.0);
+  if (!stiffness) return tl::unexpected(stiffness.error());
+  if (*stiffness != 0.0) header.config.coupling = haptics::Coupling{*stiffness, 0};
   const Result<double> length = numberIn(config, "length_mm", lattice.discZ_mm(lattice.discs - 1));
   if (!length) return tl::unexpected(length.error());
   settings.length_mm = *length;
@@ -107,9 +113,9 @@ StepResult SessionBinding::step(double t_us, double tx, double ty, double tz, do
     const plan::Bit& bit = header_.config.bit;
     if (output.removed > 0) {
       tracker_.update(session_.volume(), removed_,
-                      {input.tip_mm, normalized(input.axis), bit.diameter_mm / 2, bit.cone_length_mm});
+                      {output.bit.tip_mm, output.bit.axis, bit.diameter_mm / 2, bit.cone_length_mm});
     }
-    metrics_.add({input.t_us, input.tip_mm, input.axis, spinning, output.thrust_N, removed_});
+    metrics_.add({input.t_us, output.bit.tip_mm, output.bit.axis, spinning, output.thrust_N, removed_});
   }
   return {static_cast<int>(output.status),
           static_cast<double>(output.cycle),

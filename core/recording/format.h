@@ -9,7 +9,7 @@
 namespace spinaltap::recording {
 
 inline constexpr std::uint32_t kMagic = 0x31525453;  ///< the bytes 'S' 'T' 'R' '1'
-inline constexpr std::uint32_t kVersion = 2, kOldestVersion = 1;
+inline constexpr std::uint32_t kVersion = 3, kOldestVersion = 1;
 inline constexpr std::uint64_t kMaxPoints = 1ull << 26;
 inline constexpr std::size_t kMaxTextBytes = 4096;
 inline constexpr std::size_t kInputsPerChunk = 1000;

@@ -26,12 +26,15 @@ Result<Player> Player::create(Recording recording) {
   if (engine == "reference") engine = "clearance";
   player.thrust_N_.reserve(player.recording_.inputs.size());
   player.gone_.reserve(player.recording_.inputs.size());
+  const bool coupled = player.recording_.header.config.coupling.has_value();
+  if (coupled) player.bits_.reserve(player.recording_.inputs.size());
   const auto keep = [&](const session::Input&, const session::Output& output, std::span<const std::uint32_t> removed) {
     if (output.status != session::Status::Ok) {
       player.refused_.push_back(output.cycle);
       return;
     }
     player.thrust_N_.push_back(output.thrust_N);
+    if (coupled) player.bits_.push_back(output.bit);
     player.removed_.insert(player.removed_.end(), removed.begin(), removed.end());
     player.gone_.push_back(static_cast<std::uint32_t>(player.removed_.size()));
   };
@@ -62,7 +65,8 @@ void Player::makeKeyframes() {
 Moment Player::moment(std::uint64_t cycle) const {
   const auto refused_before = std::lower_bound(refused_.begin(), refused_.end(), cycle) - refused_.begin();
   const session::Input& input = recording_.inputs[cycle - 1 + static_cast<std::uint64_t>(refused_before)];
-  return {input, thrust_N_[cycle - 1], input.tip_mm.z, goneAt(cycle)};
+  const drill::BitPose bit = bits_.empty() ? drill::BitPose{input.tip_mm, normalized(input.axis)} : bits_[cycle - 1];
+  return {input, bit, thrust_N_[cycle - 1], bit.tip_mm.z, goneAt(cycle)};
 }
 
 void Player::seek(std::uint64_t cycle) {
@@ -82,7 +86,7 @@ void Player::seek(std::uint64_t cycle) {
 
 std::size_t Player::bytes() const {
   const auto of = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
-  std::size_t sum = of(recording_.inputs) + of(thrust_N_) + of(gone_) + of(refused_) + of(removed_);
+  std::size_t sum = of(recording_.inputs) + of(thrust_N_) + of(bits_) + of(gone_) + of(refused_) + of(removed_);
   for (const auto& frame : keyframes_) sum += of(frame);
   return sum + volume_.bytes() + recording_.volume.bytes();
 }

@@ -9,14 +9,16 @@ namespace spinaltap::recording {
 
 /// The session after one accepted input.
 struct Moment {
-  session::Input input;
+  session::Input input;  ///< of the hand
+  drill::BitPose bit;    ///< where the bit was
   double thrust_N = 0, depth_mm = 0;
   std::uint64_t removed_total = 0;
 };
 
 /// Replays once, keeping which points went in which cycle, and the whole volume now and then (keyframes); after that
 /// any cycle costs a keyframe's copy and the points between, and only the latter when it is near. Memory: 76 bytes a
-/// cycle, 4 a removed point, and 6.3 a point of the volume (two copies with densities, keyframes).
+/// cycle (124 where the bit was coupled to the hand and not held rigidly), 4 a removed point, and 6.3 a point of the
+/// volume (two copies with densities, keyframes).
 class Player {
  public:
   /// Recordings of the engine `reference` are run with `clearance`, which removes the same points and is some hundred
@@ -52,6 +54,7 @@ class Player {
   Recording recording_;
   ReplayReport report_;
   std::vector<double> thrust_N_;                       ///< after each cycle
+  std::vector<drill::BitPose> bits_;                   ///< likewise; none when held rigidly, where the hand is
   std::vector<std::uint32_t> gone_;                    ///< points removed up to each cycle
   std::vector<std::uint64_t> refused_;                 ///< for each refused input, the cycles before it
   std::vector<std::uint32_t> removed_;                 ///< cycle after cycle

@@ -71,7 +71,7 @@ bool readColumn(wire::ByteReader& in, std::uint64_t count, std::vector<T>& value
   return !in.failed() && values.size() == count;
 }
 
-Result<Header> readHeader(const Chunk& chunk) {
+Result<Header> readHeader(const Chunk& chunk, std::uint32_t version) {
   wire::ByteReader in(chunk.payload);
   Header header;
   for (std::string* text :
@@ -80,6 +80,12 @@ Result<Header> readHeader(const Chunk& chunk) {
   }
   plan::Bit& bit = header.config.bit;
   bit.diameter_mm = in.f64(), bit.cone_length_mm = in.f64(), bit.length_mm = in.f64();
+  if (version > 2) {
+    header.config.speed_rpm = in.f64();
+    haptics::Coupling coupling;
+    coupling.stiffness_N_mm = in.f64(), coupling.damping_N_s_mm = in.f64();
+    if (coupling != haptics::Coupling{0, 0}) header.config.coupling = coupling;
+  }
   if (in.failed() || in.left() != 0) return corrupt(chunk.payload_offset, "a header of the wrong length");
   return header;
 }
@@ -211,7 +217,7 @@ Result<Recording> read(std::span<const std::byte> bytes) {
 
   Recording recording;
   recording.version = version;
-  Result<Header> header = readHeader(*header_chunk);
+  Result<Header> header = readHeader(*header_chunk, version);
   if (!header) return tl::unexpected(header.error());
   recording.header = std::move(*header);
   Result<point_volume::PointVolume> volume = readVolume(*volume_chunk);

@@ -17,7 +17,7 @@ class Comparison {
   void after(std::size_t inputs, const session::Output& output, std::span<const std::uint32_t> removed,
              const point_volume::PointVolume& volume) {
     if (recording_.version > 1) removed_.add(removed, output.cycle, volume);
-    if (inputs <= recording_.checks.size() &&
+    if (hashesCompare() && inputs <= recording_.checks.size() &&
         recording_.checks[inputs - 1] != static_cast<std::uint16_t>(output.state_hash)) {
       note(output.cycle);
     }
@@ -40,8 +40,11 @@ class Comparison {
       discs_ = differingDiscs(removed_.take(), checkpoint.discs);
       if (!discs_.empty()) note(checkpoint.cycle);
     }
-    if (checkpoint.cycle != output.cycle || checkpoint.state_hash != output.state_hash) note(checkpoint.cycle);
+    const bool same_state = !hashesCompare() || checkpoint.state_hash == output.state_hash;
+    if (checkpoint.cycle != output.cycle || !same_state) note(checkpoint.cycle);
   }
+  /// Version 2 hashed another force.
+  [[nodiscard]] bool hashesCompare() const { return recording_.version != 2; }
   void note(std::uint64_t cycle) {
     if (differs_) return;
     differs_ = true;

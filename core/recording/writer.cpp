@@ -51,6 +51,9 @@ std::vector<std::byte> headerPayload(const Header& header) {
   }
   const plan::Bit& bit = header.config.bit;
   out.f64(bit.diameter_mm), out.f64(bit.cone_length_mm), out.f64(bit.length_mm);
+  out.f64(header.config.speed_rpm);
+  const haptics::Coupling coupling = header.config.coupling.value_or(haptics::Coupling{0, 0});
+  out.f64(coupling.stiffness_N_mm), out.f64(coupling.damping_N_s_mm);
   return out.take();
 }
 

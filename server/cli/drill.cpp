@@ -11,6 +11,9 @@ Result<jobs::DrillJob> jobOf(const DrillOptions& options) {
   job.engine = options.engine;
   job.cycles = options.cycles;
   job.out = options.out;
+  job.forces = options.forces;
+  job.speed_rpm = options.speed_rpm;
+  if (options.stiffness_N_mm) job.coupling = haptics::Coupling{*options.stiffness_N_mm, 0};
   if (!options.scene.empty()) {
     const auto scene = session::sceneNamed(options.scene);
     if (!scene) return tl::unexpected(scene.error());

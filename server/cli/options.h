@@ -70,8 +70,10 @@ struct PlanOptions {
 };
 
 struct DrillOptions {
-  std::string data, case_id, path_id, volume, scene, trace, engine = "clearance", out;
+  std::string data, case_id, path_id, volume, scene, trace, engine = "clearance", out, forces;
   std::optional<std::uint64_t> cycles;
+  std::optional<double> stiffness_N_mm;  ///< none: held rigidly
+  double speed_rpm = session::Config{}.speed_rpm;
   bool no_store = false;
 };
 

@@ -247,7 +247,11 @@ void addDrill(Program& program) {
       ->capture_default_str();
   sub->add_option("--cycles", o->cycles, "At most so many (default: to the end of the path or the trace)")
       ->check(CLI::NonNegativeNumber);
+  sub->add_option("--speed", o->speed_rpm, "Of the bit, in turns a minute")->capture_default_str();
+  sub->add_option("--stiffness", o->stiffness_N_mm,
+                  "N/mm of the spring between hand and bit (default: none, the bit is held rigidly)");
   sub->add_option("--out", o->out, "Write the recording here");
+  sub->add_option("--forces", o->forces, "Write force, torque and where the bit was, cycle by cycle, as CSV");
   sub->add_flag("--no-store", o->no_store, "Do not keep the recording with the case");
   sub->add_option("--data", o->data, kDataHelp);
   sub->parse_complete_callback([o] {

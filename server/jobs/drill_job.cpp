@@ -44,8 +44,20 @@ std::uint64_t inputsOf(const DrillJob& job, double start_z_mm, double length_mm)
   return job.cycles.value_or(session::sceneCycles(*job.scene, length_mm - start_z_mm));
 }
 
+constexpr const char* kForceColumns =
+    "t_us,depth_mm,thrust_N,side_x_N,side_y_N,torque_Nmm,tip_x_mm,tip_y_mm,tip_z_mm,removed\n";
+
+std::string forceRow(std::uint64_t t_us, const session::Output& output) {
+  std::array<char, 256> row{};
+  const Vec3 &force = output.force_N, &tip = output.bit.tip_mm;
+  std::snprintf(row.data(), row.size(), "%llu,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,%llu\n",
+                static_cast<unsigned long long>(t_us), output.depth_mm, output.thrust_N, force.x, force.y,
+                0.0 - output.torque_Nmm.z, tip.x, tip.y, tip.z, static_cast<unsigned long long>(output.removed));
+  return row.data();
+}
+
 Result<Run> run(session::Session& session, const DrillJob& job, std::uint64_t inputs, double start_z_mm, Kept& kept,
-                metrics::Accumulator& accumulator, const Progress& progress) {
+                metrics::Accumulator& accumulator, std::string* forces, const Progress& progress) {
   Run result;
   std::vector<std::uint32_t> removed;
   for (std::uint64_t i = 0; i < inputs; ++i) {
@@ -60,9 +72,10 @@ Result<Run> run(session::Session& session, const DrillJob& job, std::uint64_t in
       return tl::unexpected(appended.error());
     }
     if (output.status == session::Status::Ok) {
-      accumulator.add({input.t_us, input.tip_mm, input.axis, input.spinning, output.thrust_N, removed});
+      accumulator.add({input.t_us, output.bit.tip_mm, output.bit.axis, input.spinning, output.thrust_N, removed});
       result.cycles = output.cycle;
       result.behind = output.behind;
+      if (forces != nullptr) *forces += forceRow(input.t_us, output);
     } else {
       ++result.refused;
     }
@@ -91,9 +104,12 @@ Figures describeRun(const DrillSite& site, const DrillJob& job, const point_volu
 }
 
 Result<void> store(store::Store* where, const DrillSite& site, const DrillJob& job, const Kept& kept,
-                   const metrics::Metrics& metrics, Figures& figures) {
+                   const std::string& forces, const metrics::Metrics& metrics, Figures& figures) {
   if (!job.out.empty()) {
     if (const auto written = store::replaceFile(job.out, kept.bytes()); !written) return written;
+  }
+  if (!job.forces.empty()) {
+    if (const auto written = store::replaceFile(job.forces, std::as_bytes(std::span(forces))); !written) return written;
   }
   if (!job.keep) return {};
   const auto blob = where->blobs().put(kept.bytes());
@@ -134,7 +150,8 @@ Result<DrillSite> siteOfPath(store::Store& store, const std::string& case_id, co
   if (!volume) return tl::unexpected(volume.error());
   const auto model = loadModel(store, *row);
   if (!model) return tl::unexpected(model.error());
-  DrillSite site{std::move(*volume), {path->path.bit, "clearance"}, metrics::planOf(path->path), {}, case_id, path_id};
+  DrillSite site{
+      std::move(*volume), session::Config{path->path.bit}, metrics::planOf(path->path), {}, case_id, path_id};
   site.field = rbf::asField(*model, lipschitzOf(*model));
   return site;
 }
@@ -143,12 +160,14 @@ Result<DrillSite> siteOfReport() {
   auto volume = session::sceneVolume();
   if (!volume) return tl::unexpected(volume.error());
   metrics::Plan plan{session::reportBit(), session::kReportLength_mm, volume->lattice, {}};
-  return DrillSite{std::move(*volume), {session::reportBit(), "clearance"}, plan, {}, "", ""};
+  return DrillSite{std::move(*volume), session::Config{session::reportBit()}, plan, {}, "", ""};
 }
 
 Result<Figures> drill(store::Store* where, DrillSite site, const DrillJob& job, const Progress& progress) {
   Stopwatch watch;
   site.config.engine = job.engine;
+  site.config.speed_rpm = job.speed_rpm;
+  site.config.coupling = job.coupling;
   const point_volume::Lattice lattice = site.volume.lattice;
   const std::uint64_t alive = point_volume::countAlive(site.volume);
   const double start_z_mm = site.case_id.empty() ? 0 : lattice.discZ_mm(0);
@@ -165,7 +184,9 @@ Result<Figures> drill(store::Store* where, DrillSite site, const DrillJob& job, 
   auto session = session::Session::create(std::move(site.volume), site.config);
   if (!session) return tl::unexpected(session.error());
   metrics::Accumulator accumulator(site.plan);
-  const auto result = run(*session, job, inputs, start_z_mm, kept, accumulator, progress);
+  std::string forces = kForceColumns;
+  const auto result =
+      run(*session, job, inputs, start_z_mm, kept, accumulator, job.forces.empty() ? nullptr : &forces, progress);
   if (!result) return tl::unexpected(result.error());
   if (const auto finished = kept.finish(); !finished) return tl::unexpected(finished.error());
 
@@ -173,7 +194,7 @@ Result<Figures> drill(store::Store* where, DrillSite site, const DrillJob& job, 
   Figures figures = describeRun(site, job, lattice, alive, *result);
   figures.update(figuresOf(metrics));
   figures["step_us_mean"] = result->inputs == 0 ? 0 : 1e6 * result->step_s / static_cast<double>(result->inputs);
-  if (const auto stored = store(where, site, job, kept, metrics, figures); !stored) {
+  if (const auto stored = store(where, site, job, kept, forces, metrics, figures); !stored) {
     return tl::unexpected(stored.error());
   }
   figures["total_s"] = watch.lap_s();

@@ -34,6 +34,11 @@ struct DrillJob {
   std::vector<session::Input> trace;
   std::optional<std::uint64_t> cycles;  ///< of a scene: default as many as the path is long; of a trace: at most
   std::string engine = "clearance";
+  double speed_rpm = haptics::kSpeed_rpm;
+  std::optional<haptics::Coupling> coupling;  ///< none: held rigidly
+  /// CSV, whole or not at all; empty: none. A row a cycle: t_us, depth_mm, thrust_N, side_x_N, side_y_N, torque_Nmm,
+  /// tip_x_mm, tip_y_mm, tip_z_mm, removed. The tip is the bit's, in the path frame; sides as haptics::Reaction.
+  std::filesystem::path forces;
   std::filesystem::path out;  ///< a recording is written here, whole or not at all; empty: none
   bool keep = false;          ///< also keep the recording with the case
 };

@@ -7,7 +7,6 @@
 #include "core/base/hash.h"
 #include "core/base/random.h"
 #include "core/drill/bounds.h"
-#include "core/haptics/thrust.h"
 #include "core/point_volume/lattice.h"
 #include "core/session/scenes.h"
 
@@ -32,11 +31,17 @@ inline std::uint64_t hashOfBits() {
     const drill::PolarCircle polar = drill::polar(circle);
     hash = combineVec3(hash, {polar.distance_mm, polar.angle_rad, polar.radius_mm});
   }
-  haptics::Thrust thrust;
+  // Every force and place of a bit that a hand pulls at, into bone, aside, back, and stopped.
+  session::Config config{session::reportBit()};
+  config.coupling = haptics::Coupling{};
   Random random(42);
-  for (int i = 0; i < 1000; ++i) {
-    const double removed_mg = random.unit();  // arguments would be evaluated in either order
-    hash = combine(hash, bitsOf(thrust.step(removed_mg, random.below(2000))));
+  session::Session session = session::Session::create(*session::sceneVolume(40), config).value();
+  for (std::uint64_t cycle = 0; cycle < 3000; ++cycle) {
+    session::Input input = session::sceneInput(session::Scene::Hand, 2 * cycle, -0.5);
+    const double aside = random.unit();  // arguments would be evaluated in either order
+    input.tip_mm.x += cycle % 500 > 400 ? aside : 0.0;
+    input.spinning = cycle % 900 < 800;
+    hash = combine(hash, session.step(input).state_hash);
   }
   return hash;
 }

@@ -126,12 +126,14 @@ TEST(Divergence, OfAFlippedAliveBitIsNamedByTheCycleThatFirstCutNearItAndByItsDi
       20021110, flip, [](const ReplayReport& report, std::uint64_t went) { EXPECT_LE(report.first_difference, went); });
 }
 
-TEST(Divergence, OfAFlippedBitOfADensityIsNamedByTheCycleThatCutThePointAndItsDisc) {
+TEST(Divergence, OfAFlippedBitOfADensityIsNamedByTheCycleThatFeltOrCutThePointAndItsDisc) {
   const auto flip = [](point_volume::PointVolume& volume, std::uint32_t point, Random& random) {
     volume.density_mg_cm3[point] ^= static_cast<std::uint16_t>(1u << random.below(16));
   };
-  expectNamedOnThePointsDisc(
-      20021111, flip, [](const ReplayReport& report, std::uint64_t went) { EXPECT_EQ(report.first_difference, went); });
+  expectNamedOnThePointsDisc(20021111, flip, [](const ReplayReport& report, std::uint64_t went) {
+    EXPECT_LE(report.first_difference, went) << "the bit may feel a point before it cuts it";
+    EXPECT_GT(report.first_difference, 0u);
+  });
 }
 
 TEST(Divergence, OfFlippedBitsOfAnInputIsNamedAsSteppingBothSideBySideNamesIt) {
@@ -164,7 +166,7 @@ TEST(Divergence, OfTimeAloneIsOnNoDisc) {
   expectNamed(recorded, trace_of_it, tampered);
 }
 
-TEST(Divergence, OfDensitiesExchangedWithinACycleIsFoundByTheDiscsThoughTheStateIsTheSame) {
+TEST(Divergence, OfDensitiesExchangedWithinACycleIsFoundByTheDiscsThoughTheirSumIsTheSame) {
   const Recording recorded = drilled();
   const Trace trace_of_it = trace(recorded);
   const std::uint32_t points = recorded.volume.lattice.pointsPerDisc();
@@ -176,7 +178,7 @@ TEST(Divergence, OfDensitiesExchangedWithinACycleIsFoundByTheDiscsThoughTheState
       std::swap(tampered.volume.density_mg_cm3[a], tampered.volume.density_mg_cm3[b]);
       const ReplayReport report = *replay(tampered);
       EXPECT_FALSE(report.verified);
-      EXPECT_GE(report.first_difference, gone_a.cycle);
+      EXPECT_GT(report.first_difference, 0u);
       EXPECT_EQ(report.discs, (std::vector<std::uint32_t>{a / points, b / points}));
       return;
     }

@@ -24,6 +24,12 @@ constexpr std::array kVersion2 = {
 constexpr std::uint64_t kHash2 =
 #include "tests/core/recording/golden/recording_v2_hash.inc"
     ;
+constexpr std::array kVersion3 = {
+#include "tests/core/recording/golden/recording_v3.inc"
+};
+constexpr std::uint64_t kHash3 =
+#include "tests/core/recording/golden/recording_v3_hash.inc"
+    ;
 
 std::vector<std::byte> asBytes(std::span<const int> numbers) {
   std::vector<std::byte> bytes;
@@ -55,12 +61,12 @@ TEST(GoldenRecording, OfVersion1IsStillReadAndReplaysButItsHashesOfAnEarlierCore
   EXPECT_FALSE(report->comparable);
   EXPECT_EQ(report->first_difference, 0u);
   EXPECT_EQ(report->cycles, recording->checkpoints[2].cycle);
-  EXPECT_EQ(report->state_hash, kHash2) << "the same drill, as this core hashes it";
+  EXPECT_EQ(report->state_hash, kHash3) << "the same drill, as this core hashes it";
 }
 
 TEST(GoldenRecording, OfVersion1WithHashesOfThisCoreIsVerified) {
   Recording recording = *read(asBytes(kVersion1));
-  const Recording today = *read(asBytes(kVersion2));
+  const Recording today = *read(asBytes(kVersion3));
   for (std::size_t i = 0; i < 3; ++i) recording.checkpoints[i].state_hash = today.checkpoints[i].state_hash;
   EXPECT_TRUE(replay(recording)->verified);
 }
@@ -73,14 +79,33 @@ TEST(GoldenRecording, OfVersion1WithAFlippedBitIsCorrupt) {
   }
 }
 
-TEST(GoldenRecording, OfVersion2ReplaysToTheHashItHad) {
+TEST(GoldenRecording, OfVersion2IsVerifiedByWhatItRemovedThoughItsHashesHoldAnotherForce) {
   const auto recording = read(asBytes(kVersion2));
   ASSERT_TRUE(recording.has_value()) << recording.error().message;
   expectTheGoldenDrill(*recording, 2, kHash2);
+  EXPECT_FALSE(recording->header.config.coupling.has_value());
   const auto report = replay(*recording);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   EXPECT_TRUE(report->verified) << "first difference at cycle " << report->first_difference;
-  EXPECT_EQ(report->state_hash, kHash2);
+  EXPECT_EQ(report->state_hash, kHash3) << "the same drill, as this core hashes it";
+}
+
+TEST(GoldenRecording, OfVersion2WithAnotherPoseIsNotVerified) {
+  Recording recording = *read(asBytes(kVersion2));
+  for (session::Input& input : recording.inputs) input.tip_mm.x += 0.3;
+  const auto report = replay(recording);
+  EXPECT_FALSE(report->verified);
+  EXPECT_FALSE(report->discs.empty());
+}
+
+TEST(GoldenRecording, OfVersion3ReplaysToTheHashItHad) {
+  const auto recording = read(asBytes(kVersion3));
+  ASSERT_TRUE(recording.has_value()) << recording.error().message;
+  expectTheGoldenDrill(*recording, 3, kHash3);
+  const auto report = replay(*recording);
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_TRUE(report->verified) << "first difference at cycle " << report->first_difference;
+  EXPECT_EQ(report->state_hash, kHash3);
 }
 
 /// The two golden files as they would have to be, for a new version of the format; the old ones stay beside the new.
@@ -95,7 +120,7 @@ std::string asGoldenFiles(const Recorded& recorded) {
 
 TEST(GoldenRecording, IsWhatTheWriterWritesToday) {
   const Recorded recorded = record(mixedInputs(60), 25);
-  EXPECT_TRUE(recorded.bytes == asBytes(kVersion2) && recorded.final_hash == kHash2) << asGoldenFiles(recorded);
+  EXPECT_TRUE(recorded.bytes == asBytes(kVersion3) && recorded.final_hash == kHash3) << asGoldenFiles(recorded);
 }
 
 }  // namespace

@@ -104,5 +104,43 @@ TEST(Player, RefusesAnEngineThatThereIsNot) {
   EXPECT_EQ(Player::create(recording).error().code, ErrorCode::NotFound);
 }
 
+TEST(Player, ShowsWhereTheBitWasThatAHandPulledAt) {
+  Header header = smallHeader();
+  header.config.engine = "clearance";
+  header.config.speed_rpm = 750;
+  header.config.coupling = haptics::Coupling{2.5, 0.001};
+  std::vector<std::byte> bytes;
+  auto writer = Writer::begin(header, smallVolume(), [&](std::span<const std::byte> more) {
+                  bytes.insert(bytes.end(), more.begin(), more.end());
+                  return true;
+                }).value();
+  auto session = session::Session::create(smallVolume(), header.config).value();
+  std::vector<session::Output> outputs;
+  for (const session::Input& input : mixedInputs(400)) {
+    std::vector<std::uint32_t> removed;
+    const session::Output output = session.step(
+        input, [&](std::span<const std::uint32_t> some) { removed.insert(removed.end(), some.begin(), some.end()); });
+    ASSERT_TRUE(writer.append(input, output, removed, session.volume()).has_value());
+    if (output.status == session::Status::Ok) outputs.push_back(output);
+  }
+  ASSERT_TRUE(writer.finish().has_value());
+  auto read_back = read(bytes);
+  ASSERT_TRUE(read_back.has_value()) << read_back.error().message;
+  EXPECT_EQ(read_back->header.config.speed_rpm, 750);
+  EXPECT_EQ(read_back->header.config.coupling, header.config.coupling);
+  const Player player = Player::create(std::move(*read_back)).value();
+  EXPECT_TRUE(player.report().verified);
+  ASSERT_EQ(player.cycles(), outputs.size());
+  int elsewhere = 0;
+  for (std::uint64_t cycle = 1; cycle <= player.cycles(); ++cycle) {
+    const Moment moment = player.moment(cycle);
+    EXPECT_EQ(moment.bit.tip_mm, outputs[cycle - 1].bit.tip_mm);
+    EXPECT_EQ(moment.bit.axis, outputs[cycle - 1].bit.axis);
+    EXPECT_EQ(moment.depth_mm, outputs[cycle - 1].depth_mm);
+    elsewhere += moment.bit.tip_mm != moment.input.tip_mm;
+  }
+  EXPECT_GT(elsewhere, 50);
+}
+
 }  // namespace
 }  // namespace spinaltap::recording

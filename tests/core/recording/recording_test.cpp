@@ -112,7 +112,9 @@ TEST(Recording, EveryFlippedBitIsFoundWhereItIs) {
       const auto flipped = read(bytes);
       ASSERT_FALSE(flipped.has_value()) << "byte " << at << " bit " << bit;
       if (at >= 4 && at < 8) {
-        EXPECT_EQ(flipped.error().code, ErrorCode::Unsupported);
+        // 3 with one of its two lowest bits flipped is a version that is read, too, but not with this checksum.
+        const bool another_version = at == 4 && bit < 2;
+        EXPECT_EQ(flipped.error().code, another_version ? ErrorCode::Corrupt : ErrorCode::Unsupported);
       } else {
         EXPECT_EQ(flipped.error().code, ErrorCode::Corrupt);
         const std::string where = "at byte " + std::to_string(chunk_begin);
