@@ -51,7 +51,7 @@ struct Nearest {
     const double out = std::sqrt(place_mm.x * place_mm.x + place_mm.y * place_mm.y) * per_mm + 0.5;
     if (!(out < lattice.rings)) return 0;
     const int ring = static_cast<int>(out), slots = Lattice::slotsOf(ring);
-    const int slot = static_cast<int>(roughTurn(place_mm.x, place_mm.y) * slots + 0.5);
+    const int slot = static_cast<int>(std::floor(roughTurn(place_mm.x, place_mm.y) * slots + 0.5));
     const std::uint32_t index = lattice.index({static_cast<int>(disc), ring, slot < slots ? slot : slot - slots});
     return volume.isAlive(index) ? volume.density_mg_cm3[index] : std::uint16_t{0};
   }
