@@ -46,12 +46,14 @@ struct Nearest {
 
   [[nodiscard]] std::uint16_t density(const Vec3& place_mm) const {
     const Lattice& lattice = volume.lattice;
-    const double disc = std::floor(place_mm.z * per_mm + 0.5) - lattice.first_disc;
+    // Above zero a cast is the floor, which would be a call.
+    const double disc = place_mm.z * per_mm - lattice.first_disc + 0.5;
     if (!(disc >= 0 && disc < lattice.discs)) return 0;
     const double out = std::sqrt(place_mm.x * place_mm.x + place_mm.y * place_mm.y) * per_mm + 0.5;
     if (!(out < lattice.rings)) return 0;
     const int ring = static_cast<int>(out), slots = Lattice::slotsOf(ring);
-    const int slot = static_cast<int>(std::floor(roughTurn(place_mm.x, place_mm.y) * slots + 0.5));
+    const double past = roughTurn(place_mm.x, place_mm.y) * slots + 0.5;
+    const int slot = static_cast<int>(past);
     const std::uint32_t index = lattice.index({static_cast<int>(disc), ring, slot < slots ? slot : slot - slots});
     return volume.isAlive(index) ? volume.density_mg_cm3[index] : std::uint16_t{0};
   }
@@ -64,6 +66,8 @@ Probe::Probe(const Lattice& lattice, const plan::Bit& bit)
       cone_mm_(bit.cone_length_mm),
       shaft_mm_(bit.length_mm - bit.cone_length_mm),
       out_mm_(lattice.spacing_mm) {
+  const double slant = std::sqrt(radius_mm_ * radius_mm_ + cone_mm_ * cone_mm_);
+  out_across_mm_ = out_mm_ * cone_mm_ / slant, out_ahead_mm_ = out_mm_ * radius_mm_ / slant;
   for (std::size_t i = 0; i < kTipFacets; ++i) {
     const SinCos at = direction(i);
     directions_[i] = {static_cast<float>(at.cos), static_cast<float>(at.sin)};
@@ -83,10 +87,8 @@ Facet Probe::facet(std::size_t i) const {
     const double part = (static_cast<double>(i - kTipFacets) + 0.5) / kShaftFacets;
     return {radius_mm_ + out_mm_, -cone_mm_ - shaft_mm_ * part, at.x, at.y};
   }
-  const double slant = std::sqrt(radius_mm_ * radius_mm_ + cone_mm_ * cone_mm_);
   const double across = radius_mm_ * std::sqrt((static_cast<double>(i) + 0.5) / kTipFacets);
-  return {across + out_mm_ * cone_mm_ / slant, (out_mm_ * radius_mm_ / slant) - across * cone_mm_ / radius_mm_, at.x,
-          at.y};
+  return {across + out_across_mm_, out_ahead_mm_ - across * cone_mm_ / radius_mm_, at.x, at.y};
 }
 
 double Probe::clearOfLattice_mm(const BitPose& pose) const {
@@ -96,7 +98,7 @@ double Probe::clearOfLattice_mm(const BitPose& pose) const {
 void Probe::look(const point_volume::PointVolume& volume, const BitPose& pose, const Vec3& x, const Vec3& y,
                  std::span<std::uint16_t> densities) const {
   const Nearest nearest(volume);
-  for (std::size_t i = 0; i < count(); ++i) {
+  for (std::size_t i = 0; i < std::min(count(), densities.size()); ++i) {
     const Facet at = facet(i);
     const Vec3 out = x * (at.out_x * at.across_mm) + y * (at.out_y * at.across_mm);
     densities[i] = nearest.density(pose.tip_mm + out + pose.axis * at.z_mm);

@@ -43,7 +43,7 @@ class Probe {
 
   /// The density of the alive point nearest to each facet; 0 where that one is removed or none is.
   /// + - * / and sqrt only; does not allocate. @pre as Engine::step; x and y are the tool's, in the path frame;
-  /// densities.size() >= count().
+  /// densities shorter than count() leave the last facets out.
   void look(const point_volume::PointVolume& volume, const BitPose& pose, const Vec3& x, const Vec3& y,
             std::span<std::uint16_t> densities) const;
 
@@ -56,6 +56,7 @@ class Probe {
   };
   std::array<Direction, kTipFacets> directions_;  ///< of the tip's facets, and again of the shaft's
   double radius_mm_, cone_mm_, shaft_mm_, out_mm_;
+  double out_across_mm_ = 0, out_ahead_mm_ = 0;  ///< of the way out along the cone's normal
   FacetArea of_tip_, of_shaft_;
   Vec3 middle_mm_;
   double near_mm_;  ///< a tip farther from the middle than that meets nothing

@@ -61,6 +61,14 @@ haptics::Meeting Contact::meet(const point_volume::PointVolume& volume, const dr
   return meeting;
 }
 
+double Contact::frontal_mm2(const point_volume::PointVolume& volume, const drill::BitPose& pose) const {
+  std::array<std::uint16_t, drill::Probe::kTipFacets> densities;
+  probe_.look(volume, pose, haptics::toolX(pose.axis), haptics::toolY(pose.axis), densities);
+  double sum = 0;
+  for (const std::uint16_t density : densities) sum += haptics::hardness(density) * probe_.areaOf(0).frontal_mm2;
+  return sum;
+}
+
 bool Contact::isBlocked(const point_volume::PointVolume& volume, const drill::BitPose& pose) const {
   return probe_.clearOfLattice_mm(pose) == 0 && drill::meetsAlive(volume, shape_, pose);
 }

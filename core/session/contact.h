@@ -17,6 +17,9 @@ class Contact {
   /// Does not allocate. @pre as drill::Probe::look.
   [[nodiscard]] haptics::Meeting meet(const point_volume::PointVolume& volume, const drill::BitPose& pose) const;
 
+  /// Meeting::frontal_mm2 alone, for half the cost.
+  [[nodiscard]] double frontal_mm2(const point_volume::PointVolume& volume, const drill::BitPose& pose) const;
+
   /// True where a bit that does not turn can't be: an alive point is inside.
   [[nodiscard]] bool isBlocked(const point_volume::PointVolume& volume, const drill::BitPose& pose) const;
 

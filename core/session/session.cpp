@@ -158,7 +158,7 @@ haptics::LocalModel Session::localModel() const noexcept {
   std::array<double, haptics::kDepthsAhead> frontal_mm2{meeting.frontal_mm2};
   for (std::size_t i = 1; i < frontal_mm2.size(); ++i) {
     const drill::BitPose ahead{rod.tip_mm + rod.axis * haptics::kAhead_mm[i], rod.axis};
-    frontal_mm2[i] = contact_.meet(volume_, ahead).frontal_mm2;
+    frontal_mm2[i] = contact_.frontal_mm2(volume_, ahead);
   }
   return haptics::localModel(rod, meeting, frontal_mm2);
 }
