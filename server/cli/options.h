@@ -85,6 +85,7 @@ struct ServeOptions {
   std::string data, address = "127.0.0.1", web;
   std::vector<std::string> hosts;
   std::uint16_t port = 8080;
+  bool realtime = false;
 };
 
 struct CasesOptions {

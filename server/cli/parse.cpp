@@ -272,6 +272,8 @@ void addRest(Program& program) {
   sub->add_option("--port", serve->port, "0 takes a free one")->capture_default_str();
   sub->add_option("--address", serve->address, "Address to listen on")->capture_default_str();
   sub->add_option("--host", serve->hosts, "A further name by which browsers may call it, e.g. behind a proxy");
+  sub->add_flag("--realtime", serve->realtime,
+                "Live drills under SCHED_FIFO, memory locked, on a CPU of their own, as far as permitted");
   sub->add_option("--web", serve->web, "Folder of the built pages (default: found beside the program)");
 
   auto cases = std::make_shared<CasesOptions>();

@@ -28,6 +28,7 @@ Result<Outcome> runServe(const ServeOptions& options, ProgressBar&) {
   http.address = options.address;
   http.port = options.port;
   http.hosts = options.hosts;
+  http.drills.realtime = options.realtime;
   http.web = options.web.empty() ? defaultWeb() : fs::path(options.web);
   std::error_code ignored;
   if (!options.web.empty() && !fs::is_directory(http.web, ignored)) {
@@ -36,6 +37,7 @@ Result<Outcome> runServe(const ServeOptions& options, ProgressBar&) {
   if (http.web.empty()) printError("the web pages are not built: serving the interfaces only");
   const auto served = http::serve(*store, http, [&](const http::Listening& at) {
     std::printf("SpinalTap: %s\n", at.url.c_str());
+    if (!at.realtime.empty()) std::printf("real time: %s\n", at.realtime.c_str());
     std::fflush(stdout);
   });
   if (!served) return tl::unexpected(served.error());

@@ -9,14 +9,13 @@
 #include <atomic>
 #include <boost/asio.hpp>
 #include <boost/beast.hpp>
-#include <deque>
-#include <set>
 #include <thread>
 #include <tuple>
 
 #include "server/http/api.h"
 #include "server/http/static_files.h"
-#include "server/ws/drill_worker.h"
+#include "server/ws/drill_hub.h"
+#include "server/ws/realtime.h"
 
 namespace spinaltap::http {
 namespace asio = boost::asio;
@@ -38,33 +37,15 @@ constexpr auto kEndTime = std::chrono::seconds(5);
 constexpr std::size_t kLargestBody = 1 << 20;
 constexpr std::uint32_t kLargestHeader = 16 << 10;
 constexpr int kMostConnections = 512, kMostPlans = 8, kSocketThreads = 2, kApiThreads = 4;
-constexpr std::size_t kOutbox = 256;  // answers that wait for a slow reader before we stop listening to it
 constexpr std::string_view kDrill = "/ws/drill/";
 
 /// Ignores the error code, which the caller looks at.
 auto noThrow(error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
 
-/// The two ends of a live drill: the socket's coroutines on one strand, and the worker's thread.
-struct Link {
-  explicit Link(Socket& s) : socket(std::move(s)), wake(socket.get_executor()), room(socket.get_executor()) {
-    wake.expires_at(asio::steady_timer::time_point::max());
-    room.expires_at(asio::steady_timer::time_point::max());
-  }
-  Socket socket;
-  std::deque<ws::Answer> outbox;
-  asio::steady_timer wake, room;  ///< cancelled when there is something to write; room to read
-  bool ended = false;
-
-  void send(ws::Answer answer) {
-    outbox.push_back(std::move(answer));
-    wake.cancel();
-  }
-};
-
 class Server {
  public:
   Server(store::Store& store, const Options& options)
-      : options_(options), api_(store, waiting_), files_(options.web), workers_(store) {}
+      : store_(store), options_(options), api_(store, waiting_), files_(options.web) {}
 
   Result<void> run(const std::function<void(const Listening&)>& listening);
 
@@ -77,27 +58,25 @@ class Server {
   awaitable<bool> write(beast::tcp_stream& stream, const BeastRequest& request, Response response);
   awaitable<bool> writeBody(beast::tcp_stream& stream, const Response& response);
 
-  awaitable<void> drill(beast::tcp_stream& stream, const BeastRequest& request, const ws::Ticket& ticket);
-  awaitable<void> readPoses(std::shared_ptr<Link> link, std::shared_ptr<ws::DrillWorker> worker);
-  static awaitable<void> writeAnswers(std::shared_ptr<Link> link);
-  Result<std::shared_ptr<ws::DrillWorker>> startWorker(const ws::Ticket& ticket, const std::shared_ptr<Link>& link);
+  std::optional<Response> admit(const std::string& id);
+  awaitable<void> drill(beast::tcp_stream& stream, const BeastRequest& request, const std::string& id,
+                        const beast::flat_buffer& already_read);
 
   [[nodiscard]] bool knowsHost(std::string_view host) const;
   awaitable<void> waitForSignal();
 
+  store::Store& store_;
   const Options& options_;
   ws::WaitingRoom waiting_;
   Api api_;
   StaticFiles files_;
-  ws::WorkerSet workers_;
+  std::unique_ptr<ws::DrillHub> hub_;  ///< there while run() runs
   asio::io_context io_{kSocketThreads};
   asio::thread_pool api_threads_{kApiThreads}, plan_thread_{1};
   tcp::acceptor acceptor_{asio::make_strand(io_)};
   asio::signal_set signals_{acceptor_.get_executor(), SIGINT, SIGTERM};
   std::atomic<int> connections_ = 0, answering_ = 0, plans_ = 0;
   std::atomic<bool> ending_ = false;
-  std::mutex links_mutex_;
-  std::set<std::shared_ptr<Link>> links_;
 };
 
 Request plainRequest(const BeastRequest& from) {
@@ -221,10 +200,14 @@ awaitable<void> Server::connectionLoop(beast::tcp_stream& stream) {
     Request plain = plainRequest(request);
     if (websocket::is_upgrade(request) && plain.path.rfind(kDrill, 0) == 0 && knowsHost(plain.header("host")) &&
         !isForeign(plain)) {
-      if (const auto ticket = waiting_.take(plain.path.substr(kDrill.size()))) {
-        co_await drill(stream, request, *ticket);
-        co_return;
+      const std::string id = plain.path.substr(kDrill.size());
+      std::optional<Response> refused = admit(id);
+      if (!refused) {
+        co_await drill(stream, request, id, buffer);
+      } else {
+        co_await write(stream, request, std::move(*refused));
       }
+      co_return;
     }
     stream.expires_after(kPlanTime);
     ++answering_;
@@ -267,9 +250,14 @@ awaitable<Response> Server::respond(Request request) {
   plans_ += heavy ? 1 : 0;
   asio::thread_pool& pool = heavy ? plan_thread_ : api_threads_;
   co_await asio::post(pool.get_executor(), asio::use_awaitable);
+  thread_local const bool yields = (ws::yieldToLiveLoops(), true);
+  std::ignore = yields;
   Response response;
   try {
-    if (Api::owns(request.path)) {
+    if (request.path == "/metrics" && reads) {
+      response.text = hub_->metricsText();
+      response.headers = {{"Content-Type", "text/plain; version=0.0.4; charset=utf-8"}, {"Cache-Control", "no-store"}};
+    } else if (Api::owns(request.path)) {
       response = api_.handle(request);
     } else if (reads) {
       response = files_.handle(request);
@@ -332,119 +320,39 @@ awaitable<bool> Server::writeBody(beast::tcp_stream& stream, const Response& res
   co_return true;
 }
 
-Result<std::shared_ptr<ws::DrillWorker>> Server::startWorker(const ws::Ticket& ticket,
-                                                             const std::shared_ptr<Link>& link) {
-  const std::weak_ptr<Link> weak = link;
-  const auto strand = link->socket.get_executor();
-  ws::WorkerCallbacks callbacks;
-  callbacks.answer = [weak, strand](ws::Answer answer) {
-    asio::post(strand, [weak, answer = std::move(answer)]() mutable {
-      if (const auto there = weak.lock()) there->send(std::move(answer));
-    });
-  };
-  callbacks.room = [weak, strand] {
-    asio::post(strand, [weak] {
-      if (const auto there = weak.lock()) there->room.cancel();
-    });
-  };
-  return workers_.start(ticket, std::move(callbacks));
+/// What is wrong with taking a WebSocket for this session; nothing when it may come.
+std::optional<Response> Server::admit(const std::string& id) {
+  if (const auto ticket = waiting_.take(id)) {
+    const auto begun = hub_->begin(id, *ticket);
+    return begun ? std::nullopt : std::optional(problem(503, begun.error().message));
+  }
+  if (hub_->knows(id)) return {};
+  return problem(404, "there is no such drill session, or it was used or waited too long");
 }
 
-awaitable<void> Server::drill(beast::tcp_stream& stream, const BeastRequest& request, const ws::Ticket& ticket) {
-  stream.expires_never();  // the socket's own timeouts take over
+/// The handshake is Beast's; what follows is the live loops' alone.
+awaitable<void> Server::drill(beast::tcp_stream& stream, const BeastRequest& request, const std::string& id,
+                              const beast::flat_buffer& already_read) {
+  stream.expires_after(kRequestTime);
   Socket socket(std::move(stream));
-  websocket::stream_base::timeout times = websocket::stream_base::timeout::suggested(beast::role_type::server);
-  times.idle_timeout = std::chrono::seconds(60);
-  times.keep_alive_pings = true;
-  socket.set_option(times);
-  socket.binary(true);
-  socket.auto_fragment(false);
-  socket.read_message_max(256 << 10);  // just above the largest batch
   error_code error;
   co_await socket.async_accept(request, noThrow(error));
   if (error) co_return;
-  const auto link = std::make_shared<Link>(socket);
-  const auto started = startWorker(ticket, link);
-  if (!started) link->send(ws::refusal(started.error().message, ws::kPolicy));
-  // Named, not chosen inside the co_await below: g++ 12 destroys such a temporary twice.
-  const std::shared_ptr<ws::DrillWorker> worker = started ? *started : nullptr;
-  {
-    const std::scoped_lock lock(links_mutex_);
-    links_.insert(link);
-  }
-  asio::co_spawn(link->socket.get_executor(), writeAnswers(link), asio::detached);
-  co_await readPoses(link, worker);
-  link->ended = true;
-  link->wake.cancel();
-  if (worker) worker->hangUp();
-  const std::scoped_lock lock(links_mutex_);
-  links_.erase(link);
+  const int handle = beast::get_lowest_layer(socket).release_socket().release(error);
+  if (error) co_return;
+  const auto* data = static_cast<const std::byte*>(already_read.data().data());
+  hub_->adopt(handle, id, {data, data + already_read.size()});
 }
 
-awaitable<void> Server::readPoses(std::shared_ptr<Link> link, std::shared_ptr<ws::DrillWorker> worker) {
-  error_code error;
-  for (;;) {
-    beast::flat_buffer buffer;
-    co_await link->socket.async_read(buffer, noThrow(error));
-    if (error || link->ended) co_return;
-    if (!worker) continue;
-    if (link->socket.got_text()) {
-      link->send(ws::refusal("messages are binary", ws::kProtocolError));
-      continue;
-    }
-    const auto* data = static_cast<const std::byte*>(buffer.data().data());
-    std::vector<std::byte> message(data, data + buffer.size());
-    // a full queue, or answers that nobody takes, stop the reading: TCP then slows the sender
-    while (link->outbox.size() >= kOutbox || !worker->offer(message)) {
-      co_await link->room.async_wait(noThrow(error));
-      if (link->ended) co_return;
-    }
-  }
-}
-
-awaitable<void> Server::writeAnswers(std::shared_ptr<Link> link) {
-  error_code error;
-  while (!link->ended) {
-    if (link->outbox.empty()) {
-      co_await link->wake.async_wait(noThrow(error));
-      continue;
-    }
-    const ws::Answer answer = std::move(link->outbox.front());
-    link->outbox.pop_front();
-    if (link->outbox.size() + 1 == kOutbox) link->room.cancel();
-    if (!answer.message.empty()) {
-      co_await link->socket.async_write(asio::buffer(answer.message), noThrow(error));
-      if (error) break;
-    }
-    if (answer.close_code != 0) {
-      co_await link->socket.async_close(websocket::close_reason(answer.close_code), noThrow(error));
-      break;
-    }
-  }
-  link->ended = true;
-  link->room.cancel();
-  beast::get_lowest_layer(link->socket).cancel();  // a reader that still waits
-}
-
-/// Stops taking connections, tells live drills to go, and gives what is being answered five seconds.
+/// Stops taking connections, and gives what is being answered five seconds.
 awaitable<void> Server::waitForSignal() {
   co_await signals_.async_wait(asio::use_awaitable);
   ending_ = true;
   error_code ignored;
   std::ignore = acceptor_.close(ignored);
-  {
-    const std::scoped_lock lock(links_mutex_);
-    for (const auto& link : links_) {
-      asio::post(link->socket.get_executor(), [link] { link->send({{}, ws::kGoingAway}); });
-    }
-  }
   const auto until = std::chrono::steady_clock::now() + kEndTime;
   asio::steady_timer pause(acceptor_.get_executor());
-  const auto busy = [this] {
-    const std::scoped_lock lock(links_mutex_);
-    return answering_ > 0 || !links_.empty();
-  };
-  while (busy() && std::chrono::steady_clock::now() < until) {
+  while (answering_ > 0 && std::chrono::steady_clock::now() < until) {
     pause.expires_after(std::chrono::milliseconds(10));
     co_await pause.async_wait(noThrow(ignored));
   }
@@ -453,18 +361,21 @@ awaitable<void> Server::waitForSignal() {
 
 Result<void> Server::run(const std::function<void(const Listening&)>& listening) {
   if (const auto open = listen(); !open) return open;
+  auto hub = ws::DrillHub::start(store_, options_.drills);
+  if (!hub) return tl::unexpected(hub.error());
+  hub_ = std::move(*hub);
   asio::co_spawn(acceptor_.get_executor(), waitForSignal(), asio::detached);
   asio::co_spawn(acceptor_.get_executor(), acceptLoop(), asio::detached);
   const std::uint16_t port = acceptor_.local_endpoint().port();
   const bool v6 = acceptor_.local_endpoint().address().is_v6();
   const std::string host = v6 ? "[" + options_.address + "]" : options_.address;
   std::thread second([this] { io_.run(); });
-  listening({"http://" + host + ":" + std::to_string(port) + "/", port});
+  listening({"http://" + host + ":" + std::to_string(port) + "/", port, hub_->realtimeLine()});
   io_.run();
   second.join();
+  hub_->stop();  // every recording is kept before the program ends
   plan_thread_.join();
   api_threads_.join();
-  workers_.stop();  // every recording is kept before the program ends
   return {};
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/base/result.h"
 #include "server/store/store.h"
+#include "server/ws/drill_hub.h"
 
 namespace spinaltap::http {
 
@@ -16,11 +17,13 @@ struct Options {
   std::uint16_t port = 8080;         ///< 0 takes a free one
   std::filesystem::path web;         ///< the built pages; empty when there are none
   std::vector<std::string> hosts{};  ///< further names by which browsers may call it while it listens on loopback
+  ws::HubOptions drills{};           ///< the live loops
 };
 
 struct Listening {
   std::string url;  ///< "http://127.0.0.1:8080/"
   std::uint16_t port = 0;
+  std::string realtime;  ///< what was granted, one line; empty when it was not asked for
 };
 
 /// Returns after SIGINT or SIGTERM, when what is being answered is answered and every live drill is kept.

@@ -106,6 +106,7 @@ class Server {
     return code;
   }
   [[nodiscard]] int port() const { return port_; }
+  [[nodiscard]] pid_t id() const { return child_.id; }
   [[nodiscard]] const std::string& line() const { return line_; }
 
  private:

@@ -33,6 +33,15 @@ class Connection {
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     open_ = ::connect(handle_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   }
+  /// One end of a pair, with the same patience.
+  struct Pair {
+    int handle;
+  };
+  explicit Connection(Pair end) : handle_(end.handle), open_(true) {
+    const timeval limit{10, 0};
+    ::setsockopt(handle_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+    ::setsockopt(handle_, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
+  }
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
   ~Connection() { close(); }
@@ -149,6 +158,8 @@ class WebSocket {
     connection_.send(requestText(upgrade));
     reply_ = readReply(connection_, false);
   }
+  /// Without a handshake.
+  explicit WebSocket(Connection::Pair end) : connection_(end) {}
   [[nodiscard]] const Reply& reply() const { return reply_; }
 
   static std::string frame(std::span<const std::byte> payload, unsigned opcode = 2) {

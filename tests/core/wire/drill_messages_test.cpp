@@ -31,14 +31,22 @@ double nanWithPayload(std::uint64_t payload) {
 }
 
 TEST(DrillMessages, EveryGoldenMessageDecodesAndEncodesToTheSameBytes) {
-  for (const char* name : {"hello", "poses", "finish"}) expectRoundTrip<ClientMessage>(name, decodeClientMessage);
-  for (const char* name : {"welcome", "feedback", "finished", "refused"}) {
+  for (const char* name : {"hello", "hello_resume", "hello_watch", "poses", "finish"})
+    expectRoundTrip<ClientMessage>(name, decodeClientMessage);
+  for (const char* name : {"welcome", "feedback", "finished", "refused", "status"}) {
     expectRoundTrip<ServerMessage>(name, decodeServerMessage);
   }
 }
 
-TEST(DrillMessages, TheGoldenFieldsAreThoseThatTheContractNames) {
-  EXPECT_EQ(std::get<Hello>(*decodeClientMessage(golden().at("hello"))).max_rate_hz, 1000u);
+constexpr Token kToken{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+
+TEST(DrillMessages, TheGoldenFieldsOfTheClientAreThoseThatTheContractNames) {
+  EXPECT_EQ(std::get<Hello>(*decodeClientMessage(golden().at("hello"))),
+            (Hello{Role::Drive, false, false, 1000, 3.3, 2, 0.005, 1000, {}}));
+  EXPECT_EQ(std::get<Hello>(*decodeClientMessage(golden().at("hello_resume"))),
+            (Hello{Role::Drive, true, true, 0, 0, 0, 0, 0, kToken}));
+  EXPECT_EQ(std::get<Hello>(*decodeClientMessage(golden().at("hello_watch"))),
+            (Hello{Role::Watch, false, false, 60, 0, 0, 0, 0, {}}));
 
   const Poses poses = std::get<Poses>(*decodeClientMessage(golden().at("poses")));
   EXPECT_EQ(poses.first_seq, 42u);
@@ -50,24 +58,64 @@ TEST(DrillMessages, TheGoldenFieldsAreThoseThatTheContractNames) {
   EXPECT_EQ(poses.poses[1].tip_mm.y, std::numeric_limits<double>::infinity());
   EXPECT_TRUE(std::signbit(poses.poses[1].tip_mm.z));
   EXPECT_FALSE(poses.poses[1].spinning);
+}
 
+TEST(DrillMessages, TheGoldenFieldsOfTheServerAreThoseThatTheContractNames) {
   const Welcome welcome = std::get<Welcome>(*decodeServerMessage(golden().at("welcome")));
+  EXPECT_TRUE(welcome.realtime);
   EXPECT_EQ(welcome.state_hash, 0x0123456789abcdefull);
   EXPECT_EQ(welcome.points_alive, 986958u);
+  EXPECT_EQ(welcome.token, kToken);
+  EXPECT_EQ(welcome.next_seq, 43u);
+  EXPECT_EQ(welcome.stiffness_N_mm, 2);
+  EXPECT_EQ(welcome.damping_N_s_mm, 0.001);
+  EXPECT_EQ(welcome.force_scale, 0.0825);
+  EXPECT_EQ(welcome.hash_every, 16u);
 
   const Feedback feedback = std::get<Feedback>(*decodeServerMessage(golden().at("feedback")));
   EXPECT_EQ(feedback.seq, 43u);
+  EXPECT_EQ(feedback.t_us, 2000u);
   EXPECT_EQ(feedback.status, session::Status::RefusedNotFinite);
+  EXPECT_TRUE(feedback.behind && feedback.limited && feedback.has_hash);
   EXPECT_EQ(feedback.cycle, 1001u);
   EXPECT_EQ(feedback.removed_total, 12345u);
-  EXPECT_EQ(feedback.thrust_N, 4.5);
+  EXPECT_EQ(feedback.force_N, (Vec3{0.25, -0.5, -3.25}));
+  EXPECT_EQ(feedback.torque_Nmm, (Vec3{1.5, -2, -18}));
+  EXPECT_EQ(feedback.force_patient_N, (Vec3{-0.5, 0.25, 3.25}));
+  EXPECT_EQ(feedback.tip_mm, (Vec3{0.125, -0.0625, -0.125}));
+  EXPECT_EQ(feedback.axis, (Vec3{0, 0.6, 0.8}));
   EXPECT_EQ(feedback.depth_mm, -0.125);
+  EXPECT_EQ(feedback.thrust_N, 4.5);
+  EXPECT_EQ(feedback.local.bit.tip_mm, feedback.tip_mm);
+  EXPECT_EQ(feedback.local.frontal_mm2, (std::array<float, 5>{1, 1.5F, 2, 2.5F, 3}));
+  EXPECT_EQ(feedback.local.rubbing_mm2, 12.5F);
+  EXPECT_EQ(feedback.local.side_mm2[7], 3.5F);
+  EXPECT_EQ(feedback.local.side_lever[7], 0.875F);
   EXPECT_EQ(feedback.state_hash, 0xfedcba9876543210ull);
 
   const Finished finished = std::get<Finished>(*decodeServerMessage(golden().at("finished")));
   EXPECT_EQ(finished.recording_id, "r7k2m9xq");
   EXPECT_EQ(finished.metrics_json, "{\"peak_thrust_N\":4.5}");
   EXPECT_EQ(std::get<Refused>(*decodeServerMessage(golden().at("refused"))).reason, "no such session");
+  const SessionStatus status = std::get<SessionStatus>(*decodeServerMessage(golden().at("status")));
+  EXPECT_EQ(status.code, StatusCode::Paused);
+  EXPECT_EQ(status.text, "the trainee is away");
+}
+
+TEST(DrillMessages, WithoutItsFlagAHashIsNotSent) {
+  Feedback feedback;
+  feedback.state_hash = 99;
+  EXPECT_EQ(std::get<Feedback>(*decodeServerMessage(encode(ServerMessage(feedback)))).state_hash, 0u);
+}
+
+TEST(DrillMessages, PosesReadIntoABatchThatIsThereAreTheSame) {
+  Poses batch;
+  batch.poses.resize(7);
+  ASSERT_TRUE(decodePoses(golden().at("poses"), batch).has_value());
+  EXPECT_EQ(encode(ClientMessage(batch)), golden().at("poses"));
+  for (const auto& [name, bytes] : golden()) {
+    EXPECT_EQ(decodePoses(bytes, batch).has_value(), name == "poses") << name;
+  }
 }
 
 TEST(DrillMessages, EveryBadGoldenMessageIsRefusedWithOneLine) {
@@ -82,8 +130,12 @@ TEST(DrillMessages, EveryBadGoldenMessageIsRefusedWithOneLine) {
       EXPECT_FALSE(error.error().message.empty());
     }
   }
-  EXPECT_EQ(bad, 7);
+  EXPECT_EQ(bad, 20);
   EXPECT_EQ(decodeClientMessage(golden().at("bad_version")).error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(decodeClientMessage(golden().at("bad_version_1")).error().message,
+            "drill message: protocol version 1 is no longer spoken, this side speaks 2");
+  EXPECT_EQ(decodeClientMessage(golden().at("bad_hello_nan")).error().message,
+            "drill message: hello: the maximum force is no number from 0 on at byte 52");
   EXPECT_EQ(decodeClientMessage(golden().at("bad_flags")).error().message, "drill message: reserved flags at byte 64");
 }
 
@@ -103,10 +155,10 @@ TEST(DrillMessages, AMessageCutAnywhereOrWithAByteTooManyIsRefused) {
 }
 
 TEST(DrillMessages, NeitherSideTakesTheOthersMessages) {
-  for (const char* name : {"welcome", "feedback", "finished", "refused"}) {
+  for (const char* name : {"welcome", "feedback", "finished", "refused", "status"}) {
     EXPECT_FALSE(decodeClientMessage(golden().at(name)).has_value()) << name;
   }
-  for (const char* name : {"hello", "poses", "finish"}) {
+  for (const char* name : {"hello", "hello_resume", "hello_watch", "poses", "finish"}) {
     EXPECT_FALSE(decodeServerMessage(golden().at(name)).has_value()) << name;
   }
 }

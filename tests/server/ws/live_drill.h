@@ -1,5 +1,6 @@
 // tests/server/ws/live_drill.h - messages of a drill, and what the same poses give in a session of one's own.
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "core/session/scenes.h"
@@ -11,7 +12,23 @@ namespace spinaltap::test {
 
 using Bytes = std::vector<std::byte>;
 
-inline Bytes helloBytes() { return wire::encode(wire::ClientMessage(wire::Hello{1000})); }
+/// Drives a bit that is held rigidly, as the browser does.
+inline wire::Hello rigidHello() {
+  wire::Hello hello;
+  hello.rigid = true;
+  return hello;
+}
+inline Bytes helloBytes(const wire::Hello& hello = rigidHello()) { return wire::encode(wire::ClientMessage(hello)); }
+inline Bytes resumeBytes(const wire::Token& token) {
+  wire::Hello hello = rigidHello();
+  hello.resumes = true, hello.token = token;
+  return helloBytes(hello);
+}
+inline Bytes watchBytes() {
+  wire::Hello hello;
+  hello.role = wire::Role::Watch;
+  return helloBytes(hello);
+}
 inline Bytes finishBytes() { return wire::encode(wire::ClientMessage(wire::Finish{})); }
 inline Bytes posesBytes(std::uint32_t first, std::vector<session::Input> poses) {
   return wire::encode(wire::ClientMessage(wire::Poses{first, std::move(poses)}));
@@ -33,11 +50,14 @@ inline std::vector<session::Input> somePoses(std::uint64_t count) {
 struct Expected {
   std::uint64_t start_hash = 0, hash = 0, cycle = 0, removed_total = 0;
   double thrust_N = 0;
+  session::Output last;
 };
 
 /// The core alone, in this process.
-inline Expected runLocally(store::Store& store, const SmallCase& small, const std::vector<session::Input>& poses) {
+inline Expected runLocally(store::Store& store, const SmallCase& small, const std::vector<session::Input>& poses,
+                           const std::optional<haptics::Coupling>& coupling = {}) {
   jobs::DrillSite site = jobs::siteOfPath(store, small.case_id, small.path_id).value();
+  site.config.coupling = coupling;
   session::Session session = session::Session::create(std::move(site.volume), site.config).value();
   Expected expected;
   expected.start_hash = session.stateHash();
@@ -46,6 +66,7 @@ inline Expected runLocally(store::Store& store, const SmallCase& small, const st
     expected.cycle = output.cycle;
     expected.removed_total = output.removed_total;
     expected.thrust_N = output.thrust_N;
+    expected.last = output;
   }
   expected.hash = session.stateHash();
   return expected;

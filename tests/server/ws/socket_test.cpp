@@ -1,7 +1,8 @@
 // A live drill on the real server, over a real socket.
 #include <gtest/gtest.h>
 
-#include <atomic>
+#include <cstdlib>
+#include <fstream>
 #include <thread>
 
 #include "core/recording/recording.h"
@@ -59,6 +60,7 @@ TEST_F(LiveDrill, GivesTheSameHashAsTheCoreHere) {
     last = decoded<wire::Feedback>(socket.receive().payload);
     EXPECT_EQ(last.seq, at + 19) << "one feedback a batch, in order";
   }
+  ASSERT_TRUE(last.has_hash) << "20 poses are more than the cycles from hash to hash";
   EXPECT_EQ(last.state_hash, expected.hash);
   EXPECT_EQ(last.removed_total, expected.removed_total);
   socket.send(finishBytes());
@@ -73,7 +75,7 @@ TEST_F(LiveDrill, GivesTheSameHashAsTheCoreHere) {
   EXPECT_EQ(report.state_hash, expected.hash);
 }
 
-TEST_F(LiveDrill, DisconnectingInTheMiddleOfAFrameKeepsTheRecording) {
+TEST_F(LiveDrill, DisconnectingInTheMiddleOfAFrameKeepsTheRecordingWhenTheServerEnds) {
   const auto poses = somePoses(400);
   {
     WebSocket socket(server_.port(), socketUrl());
@@ -85,18 +87,20 @@ TEST_F(LiveDrill, DisconnectingInTheMiddleOfAFrameKeepsTheRecording) {
     const std::string frame = WebSocket::frame(posesBytes(300, {poses.begin() + 300, poses.end()}));
     socket.connection().send(frame.substr(0, frame.size() / 2));
   }
+  EXPECT_EQ(get(server_.port(), "/healthz").status, 200);
+  EXPECT_TRUE(store_.recordings(small_.case_id).value().empty()) << "it may be resumed";
+  EXPECT_EQ(server_.end(), 0);
   const auto rows = recordings(1);
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_FALSE(rows[0].complete);
   const auto report = replayed(rows[0]);
   EXPECT_TRUE(report.verified);
   EXPECT_EQ(report.state_hash, runLocally(store_, small_, {poses.begin(), poses.begin() + 300}).hash);
-  EXPECT_EQ(get(server_.port(), "/healthz").status, 200);
 }
 
 TEST_F(LiveDrill, MalformedMessagesCloseWith1002) {
   auto version = helloBytes(), type = helloBytes(), poses = posesBytes(0, somePoses(1));
-  version[1] = std::byte{2};
+  version[1] = std::byte{1};
   type[0] = std::byte{99};
   poses.pop_back();
   for (const Bytes& bad : {version, type, poses, Bytes{}}) {
@@ -120,14 +124,60 @@ TEST_F(LiveDrill, AMessageThatIsTooLargeClosesWith1009) {
   EXPECT_EQ(socket.receive().closeCode(), 1009);
 }
 
-TEST_F(LiveDrill, ASessionIsUsedOnceAndOnlyFromItsOwnPages) {
+TEST_F(LiveDrill, ASessionIsTakenOnlyFromItsOwnPagesAndByOneDriver) {
   const std::string url = socketUrl();
   EXPECT_EQ(WebSocket(server_.port(), url, {"Origin: https://evil.example"}).reply().status, 403);
-  EXPECT_EQ(WebSocket(server_.port(), url, {"Origin: http://127.0.0.1"}).reply().status, 101) << "still unused";
-  EXPECT_EQ(WebSocket(server_.port(), url).reply().status, 404);
+  WebSocket first(server_.port(), url, {"Origin: http://127.0.0.1"});
+  EXPECT_EQ(first.reply().status, 101) << "still unused";
+  first.send(helloBytes());
+  std::ignore = decoded<wire::Welcome>(first.receive().payload);
+  WebSocket second(server_.port(), url);
+  second.send(helloBytes());
+  expectRefusedWith(second, 1008);
   EXPECT_EQ(WebSocket(server_.port(), "/ws/drill/snever").reply().status, 404);
   EXPECT_EQ(WebSocket(server_.port(), "/ws/other").reply().status, 404);
   EXPECT_EQ(get(server_.port(), "/ws/drill/snever").status, 426);
+}
+
+TEST_F(LiveDrill, IsResumedByItsTokenOnTheSameAddress) {
+  const auto poses = somePoses(400);
+  const std::string url = socketUrl();
+  wire::Token token{};
+  {
+    WebSocket socket(server_.port(), url);
+    socket.send(helloBytes());
+    token = decoded<wire::Welcome>(socket.receive().payload).token;
+    socket.send(posesBytes(0, {poses.begin(), poses.begin() + 200}));
+    std::ignore = socket.receive();
+  }
+  WebSocket socket(server_.port(), url);
+  ASSERT_EQ(socket.reply().status, 101);
+  socket.send(resumeBytes(token));
+  const auto welcome = decoded<wire::Welcome>(socket.receive().payload);
+  EXPECT_EQ(welcome.next_seq, 200u);
+  socket.send(posesBytes(200, {poses.begin() + 200, poses.end()}));
+  EXPECT_EQ(decoded<wire::Feedback>(socket.receive().payload).seq, 399u);
+  socket.send(finishBytes());
+  std::ignore = decoded<wire::Finished>(socket.receive().payload);
+  const auto rows = recordings(1);
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_TRUE(rows[0].complete);
+  EXPECT_EQ(replayed(rows[0]).state_hash, runLocally(store_, small_, poses).hash);
+}
+
+TEST_F(LiveDrill, MetricsCountWhatWasDrilled) {
+  WebSocket socket(server_.port(), socketUrl());
+  socket.send(helloBytes());
+  std::ignore = socket.receive();
+  socket.send(posesBytes(0, somePoses(300)));
+  std::ignore = socket.receive();
+  const Reply reply = get(server_.port(), "/metrics");
+  EXPECT_EQ(reply.status, 200);
+  EXPECT_EQ(reply.header("content-type").rfind("text/plain; version=0.0.4", 0), 0u);
+  EXPECT_NE(reply.body.find("\nspinaltap_cycles_total 300\n"), std::string::npos);
+  EXPECT_NE(reply.body.find("\nspinaltap_cycle_seconds_count 300\n"), std::string::npos);
+  EXPECT_NE(reply.body.find("\nspinaltap_cycle_seconds_bucket{le=\"+Inf\"} 300\n"), std::string::npos);
+  EXPECT_NE(reply.body.find("\nspinaltap_answer_seconds_count 1\n"), std::string::npos);
 }
 
 TEST_F(LiveDrill, SeveralAtOnceDoNotDisturbEachOther) {
@@ -140,8 +190,8 @@ TEST_F(LiveDrill, SeveralAtOnceDoNotDisturbEachOther) {
       socket.send(helloBytes());
       std::ignore = socket.receive();
       wire::Feedback last;
-      for (std::uint32_t at = 0; at < poses.size(); at += 10) {
-        socket.send(posesBytes(at, {poses.begin() + at, poses.begin() + at + 10}));
+      for (std::uint32_t at = 0; at < poses.size(); at += 20) {
+        socket.send(posesBytes(at, {poses.begin() + at, poses.begin() + at + 20}));
         last = decoded<wire::Feedback>(socket.receive().payload);
       }
       EXPECT_EQ(last.state_hash, expected.hash);
@@ -153,30 +203,42 @@ TEST_F(LiveDrill, SeveralAtOnceDoNotDisturbEachOther) {
   EXPECT_EQ(recordings(4).size(), 4u);
 }
 
-TEST_F(LiveDrill, ATraineeWhoReadsNothingIsSlowedNotBuffered) {
-  // 5 MB of answers: more than Linux lets a socket hold unsent by default (4 MiB, tcp_wmem). 46 MB of poses: more than
-  // both ends hold unread.
-  constexpr std::uint32_t kBatches = 100'000, kPoses = 8;
-  const std::vector<session::Input> batch(kPoses);  // the bit stands still
+/// What a process holds in memory, kB.
+long residentKb(int id) {
+  std::ifstream status("/proc/" + std::to_string(id) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmRSS:", 0) == 0) return std::atol(line.c_str() + 6);
+  }
+  return 0;
+}
+
+TEST_F(LiveDrill, ATraineeWhoReadsNothingIsAnsweredWithTheNewestAndCostsNoMemory) {
+  // 26 MB of answers, many times what the system holds unsent and unread together (4 MiB, tcp_wmem, at the most)
+  constexpr std::uint32_t kBatches = 100'000, kWarm = 20'000;
+  const std::vector<session::Input> batch(1);  // the bit stands still
   WebSocket socket(server_.port(), socketUrl(), {}, 4096);
   socket.send(helloBytes());
-  std::atomic<std::uint32_t> sent = 0;
-  std::thread writer([&] {
-    while (sent < kBatches && socket.send(posesBytes(sent * kPoses, batch))) ++sent;
-  });
-  std::uint32_t before = 0;
-  do {  // until nothing has moved for half a second
-    before = sent;
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
-  } while (sent != before);
-  EXPECT_LT(sent, kBatches) << "the server stopped reading";
+  std::uint32_t sent = 0;
+  const auto sendUpTo = [&](std::uint32_t end) {
+    while (sent < end) ASSERT_TRUE(socket.send(posesBytes(sent++, batch)));
+  };
+  sendUpTo(kWarm);
+  const long before_kb = residentKb(server_.id());
+  sendUpTo(kBatches);
+  EXPECT_LT(residentKb(server_.id()), before_kb + 24 * 1024)
+      << "the recording's last seconds and allocator slack, not 21 MB of answers and what they are queued in";
   EXPECT_EQ(get(server_.port(), "/healthz").status, 200) << "others are served meanwhile";
-  std::ignore = socket.receive();
-  for (std::uint32_t i = 0; i < kBatches; ++i) {
-    ASSERT_EQ(decoded<wire::Feedback>(socket.receive().payload).seq, i * kPoses + kPoses - 1);
+  std::ignore = decoded<wire::Welcome>(socket.receive().payload);
+  std::uint32_t answers = 0, seq = 0;
+  for (bool first = true; seq + 1 < kBatches; first = false) {
+    const auto feedback = decoded<wire::Feedback>(socket.receive().payload);
+    ASSERT_TRUE(first || feedback.seq > seq) << "never an older one after a newer one";
+    seq = feedback.seq;
+    ++answers;
   }
-  writer.join();
-  EXPECT_EQ(sent, kBatches) << "nothing was lost";
+  EXPECT_LT(answers, kBatches) << "most were replaced by newer ones";
+  socket.send(finishBytes());
+  std::ignore = decoded<wire::Finished>(socket.receive().payload);
 }
 
 TEST_F(LiveDrill, EndingTheServerKeepsWhatIsBeingDrilled) {

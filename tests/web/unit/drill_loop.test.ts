@@ -78,19 +78,20 @@ describe("the live loop", () => {
   });
 });
 
-function feedback(seq: number, cycle: number, hash: bigint): Uint8Array {
-  const bytes = new Uint8Array(47);
+function feedback(seq: number, cycle: number, hash: bigint | null): Uint8Array {
+  const bytes = new Uint8Array(264);
   const view = new DataView(bytes.buffer);
-  bytes.set([130, 1]);
+  bytes.set([130, 2]);
   view.setUint32(2, seq, true);
-  view.setBigUint64(7, BigInt(cycle), true);
-  view.setBigUint64(39, hash, true);
+  view.setUint8(15, hash === null ? 0 : 4);
+  view.setBigUint64(16, BigInt(cycle), true);
+  view.setBigUint64(256, hash ?? 0n, true);
   return bytes;
 }
 function welcome(hash: bigint): Uint8Array {
-  const bytes = new Uint8Array(14);
-  bytes.set([129, 1]);
-  new DataView(bytes.buffer).setBigUint64(2, hash, true);
+  const bytes = new Uint8Array(63);
+  bytes.set([129, 2]);
+  new DataView(bytes.buffer).setBigUint64(3, hash, true);
   return bytes;
 }
 const batch = (first_seq: number, cycle: number, hash: string) => ({
@@ -127,6 +128,7 @@ describe("the line to the server", () => {
     expect(sent.length).toBe(1);
     link.received(welcome(7n));
     expect(sent.map((bytes) => decodeClientMessage(bytes).type)).toEqual(["hello", "poses"]);
+    expect(decodeClientMessage(sent[0]!)).toMatchObject({ role: "drive", rigid: true, token: null });
   });
 
   test("agrees when the hashes of the same cycle are equal", () => {
@@ -136,6 +138,17 @@ describe("the line to the server", () => {
     link.send(batch(1, 2, "00000000000000bb"));
     link.received(feedback(0, 1, 0xaan));
     expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 1, behind: 1 });
+  });
+
+  test("an answer to several batches at once, without a hash, agrees by its cycles", () => {
+    const { link, said } = makeLink();
+    link.received(welcome(7n));
+    link.send(batch(0, 1, "00000000000000aa"));
+    link.send(batch(1, 2, "00000000000000bb"));
+    link.received(feedback(1, 2, null));
+    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 2, behind: 0 });
+    link.received(Uint8Array.from([133, 2, 4, 0, 0, 0, 0]));
+    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 2, behind: 0 });
   });
 
   test("a differing hash, start state or cycle count is said once and stays said", () => {
@@ -155,7 +168,7 @@ describe("the line to the server", () => {
 
   test("a refusal, rubbish or a broken line means offline, with the reason", () => {
     const { link, said } = makeLink();
-    link.received(Uint8Array.from([99, 1]));
+    link.received(Uint8Array.from([99, 2]));
     expect(said.at(-1)).toMatchObject({ kind: "offline" });
     const other = makeLink();
     other.link.lost("the line to the server closed");

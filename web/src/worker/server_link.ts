@@ -1,5 +1,5 @@
 // The line to the server's session: sends batches, compares the server's state hash with ours at the same cycle.
-import { decodeServerMessage, encodeClientMessage } from "../contract/drill_messages";
+import { decodeServerMessage, encodeClientMessage, type Hello } from "../contract/drill_messages";
 import type { Batch } from "./drill_loop";
 
 export type Agreement =
@@ -34,7 +34,19 @@ export class ServerLink {
   ) {}
 
   opened(): void {
-    this.wire.send(encodeClientMessage({ type: "hello", max_rate_hz: 0 }));
+    // Rigid: this page computes the same drill itself, and shows what the server says of it.
+    const hello: Hello = {
+      type: "hello",
+      role: "drive",
+      rigid: true,
+      max_rate_hz: 0,
+      max_force_N: 0,
+      max_stiffness_N_mm: 0,
+      damping_N_s_mm: 0,
+      device_rate_hz: 0,
+      token: null,
+    };
+    this.wire.send(encodeClientMessage(hello));
   }
 
   send(batch: Batch): void {
@@ -95,13 +107,16 @@ export class ServerLink {
       case "refused":
         this.drop(`the server refused: ${message.reason}`);
         break;
+      case "status":
+        break;
     }
   }
 
-  private compare(theirs: string, ours: { cycle: number; hash: string }): void {
+  /** A feedback without a hash agrees by its count of cycles; the hash comes every few. */
+  private compare(theirs: string | null, ours: { cycle: number; hash: string }): void {
     // Once they differ they cannot agree again: keep the first cycle at which it was seen.
     if (this.state.kind === "differs") return;
-    if (theirs === ours.hash)
+    if (theirs === null || theirs === ours.hash)
       this.say({ kind: "agrees", cycle: ours.cycle, behind: this.sent_cycle - ours.cycle });
     else this.say({ kind: "differs", cycle: ours.cycle });
   }
