@@ -26,6 +26,7 @@ struct Outcome {
 [[nodiscard]] Result<Outcome> runDrill(const DrillOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runReplay(const ReplayOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runServe(const ServeOptions& options, ProgressBar& bar);
+[[nodiscard]] Result<Outcome> runLoad(const LoadOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runCases(const CasesOptions& options, ProgressBar& bar);
 [[nodiscard]] Result<Outcome> runVersion();
 

@@ -88,6 +88,13 @@ struct ServeOptions {
   bool realtime = false;
 };
 
+struct LoadOptions {
+  int sessions = 64;
+  double rate_hz = 1000, seconds = 10;
+  std::string server, case_id, path_id;
+  bool realtime = false;
+};
+
 struct CasesOptions {
   std::string data;
 };

@@ -260,6 +260,23 @@ void addDrill(Program& program) {
   });
 }
 
+void addLoad(Program& program) {
+  auto o = std::make_shared<LoadOptions>();
+  CLI::App* sub = add(program, "load", "Drill with many trainees at once over sockets; prints round trips", o, runLoad);
+  sub->add_option("--sessions", o->sessions, "Trainees")->check(CLI::Range(1, 64))->capture_default_str();
+  sub->add_option("--rate", o->rate_hz, "Poses a second of each, Hz")
+      ->check(CLI::Range(1.0, 20'000.0))
+      ->capture_default_str();
+  sub->add_option("--seconds", o->seconds, "How long")->check(CLI::Range(0.1, 3600.0))->capture_default_str();
+  CLI::Option* server =
+      sub->add_option("--server", o->server, "http://ADDRESS:PORT of one that runs (default: our own)");
+  CLI::Option* path_case = sub->add_option("CASE", o->case_id, "Case id on that server");
+  CLI::Option* path = sub->add_option("PATH", o->path_id, "Path id on that server");
+  server->needs(path_case)->needs(path);
+  path_case->needs(server);
+  sub->add_flag("--realtime", o->realtime, "Our own server with serve --realtime")->excludes(server);
+}
+
 void addRest(Program& program) {
   auto replay = std::make_shared<ReplayOptions>();
   CLI::App* sub = add(program, "replay", "Run a recording again and compare the hashes", replay, runReplay);
@@ -335,6 +352,7 @@ int run(int argc, char** argv) {
   addTradeoff(program);
   addPlan(program);
   addDrill(program);
+  addLoad(program);
   addRest(program);
   try {
     program.app.parse(argc, argv);
