@@ -1,6 +1,8 @@
 // core/wire/bytes.h - little-endian fields, one by one; a struct's bytes never leave the process.
 #pragma once
+#include <array>
 #include <bit>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -68,6 +70,30 @@ class ByteWriter {
     for (unsigned shift = 0; shift < 8 * sizeof(T); shift += 8) u8(static_cast<std::uint8_t>(v >> shift));
   }
   std::vector<std::byte> bytes_;
+};
+
+/// As ByteWriter, into N bytes that are there: for messages of one size that are written at haptic rates.
+/// @pre what is written fits.
+template <std::size_t N>
+class FixedWriter {
+ public:
+  void u8(std::uint8_t v) { put(v); }
+  void u32(std::uint32_t v) { put(v); }
+  void u64(std::uint64_t v) { put(v); }
+  void f32(float v) { put(v); }
+  void f64(double v) { put(v); }
+  void vec3(const Vec3& v) { put(v.x), put(v.y), put(v.z); }
+  [[nodiscard]] std::span<const std::byte> bytes() const { return std::span(bytes_).first(size_); }
+
+ private:
+  template <class T>
+  void put(T v) {
+    assert(size_ + sizeof v <= N);
+    copyLittleEndian<T>(bytes_.data() + size_, reinterpret_cast<const std::byte*>(&v), 1);
+    size_ += sizeof v;
+  }
+  std::array<std::byte, N> bytes_;
+  std::size_t size_ = 0;
 };
 
 /// Reads past the end give zeros and set failed(); check it once, at the end or before a length is trusted.

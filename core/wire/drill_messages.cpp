@@ -24,13 +24,9 @@ struct Overloaded : Cases... {
 template <class... Cases>
 Overloaded(Cases...) -> Overloaded<Cases...>;
 
-void writeHead(ByteWriter& out, MessageType type) {
-  out.u8(static_cast<std::uint8_t>(type)), out.u8(kDrillProtocolVersion);
-}
-
 ByteWriter open(MessageType type) {
   ByteWriter out;
-  writeHead(out, type);
+  out.u8(static_cast<std::uint8_t>(type)), out.u8(kDrillProtocolVersion);
   return out;
 }
 
@@ -207,8 +203,9 @@ tl::unexpected<Error> unknownType(MessageType type) {
 
 }  // namespace
 
-void encodeFeedback(const Feedback& m, ByteWriter& out) {
-  writeHead(out, MessageType::Feedback);
+void encodeFeedback(const Feedback& m, ByteWriter& to) {
+  FixedWriter<kFeedbackBytes> out;
+  out.u8(static_cast<std::uint8_t>(MessageType::Feedback)), out.u8(kDrillProtocolVersion);
   out.u32(m.seq), out.u64(m.t_us), out.u8(static_cast<std::uint8_t>(m.status));
   out.u8(
       static_cast<std::uint8_t>(bit(m.behind, kBehindBit) | bit(m.limited, kLimitedBit) | bit(m.has_hash, kHashBit)));
@@ -221,6 +218,7 @@ void encodeFeedback(const Feedback& m, ByteWriter& out) {
   for (const float v : m.local.side_mm2) out.f32(v);
   for (const float v : m.local.side_lever) out.f32(v);
   out.u64(m.has_hash ? m.state_hash : 0);
+  to.raw(out.bytes());
 }
 
 std::vector<std::byte> encode(const ClientMessage& message) {

@@ -108,7 +108,7 @@ using ServerMessage = std::variant<Welcome, Feedback, Finished, Refused, Session
 [[nodiscard]] std::vector<std::byte> encode(const ClientMessage& message);
 [[nodiscard]] std::vector<std::byte> encode(const ServerMessage& message);
 /// Appends the same bytes; allocates nothing where the writer has kept its memory.
-void encodeFeedback(const Feedback& message, ByteWriter& out);
+void encodeFeedback(const Feedback& message, ByteWriter& to);
 
 /// Total over any bytes. Poses keep all 64 bits of every number: it is for session::step to refuse what is no pose.
 /// @error Corrupt (unknown type, wrong length, reserved bits), Unsupported (another version). The message names the

@@ -29,6 +29,7 @@ Result<Outcome> runLoad(const LoadOptions& options, ProgressBar& bar) {
   job.sessions = options.sessions;
   job.rate_hz = options.rate_hz;
   job.seconds = options.seconds;
+  job.rigid = options.rigid;
   job.realtime = options.realtime;
   if (!options.server.empty()) {
     auto target = parseTarget(options);

@@ -92,7 +92,7 @@ struct LoadOptions {
   int sessions = 64;
   double rate_hz = 1000, seconds = 10;
   std::string server, case_id, path_id;
-  bool realtime = false;
+  bool rigid = false, realtime = false;
 };
 
 struct CasesOptions {

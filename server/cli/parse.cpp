@@ -274,7 +274,9 @@ void addLoad(Program& program) {
   CLI::Option* path = sub->add_option("PATH", o->path_id, "Path id on that server");
   server->needs(path_case)->needs(path);
   path_case->needs(server);
-  sub->add_flag("--realtime", o->realtime, "Our own server with serve --realtime")->excludes(server);
+  sub->add_flag("--rigid", o->rigid, "Hold the bit as a machine does, without a coupling");
+  sub->add_flag("--realtime", o->realtime, "Our own server with serve --realtime, and the generator like it")
+      ->excludes(server);
 }
 
 void addRest(Program& program) {

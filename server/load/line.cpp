@@ -106,14 +106,16 @@ Line::Line(Socket socket) : socket_(std::move(socket)) {
   ::fcntl(socket_.handle(), F_SETFL, ::fcntl(socket_.handle(), F_GETFL) | O_NONBLOCK);
 }
 
-Result<Line> Line::open(const Target& target) {
+Result<Line> Line::open(const Target& target, bool rigid) {
   const auto id = makeSession(target);
   if (!id) return tl::unexpected(id.error());
   auto socket = connectTo(target.host, target.port);
   if (!socket) return tl::unexpected(socket.error());
   if (const auto opened = upgrade(socket->handle(), target, *id); !opened) return tl::unexpected(opened.error());
+  wire::Hello how;
+  how.rigid = rigid;
   wire::ByteWriter hello;
-  ws::writeFrame(hello, ws::Opcode::Binary, wire::encode(wire::ClientMessage(wire::Hello{})), ws::Side::Client);
+  ws::writeFrame(hello, ws::Opcode::Binary, wire::encode(wire::ClientMessage(how)), ws::Side::Client);
   if (!sendAll(socket->handle(), {reinterpret_cast<const char*>(hello.bytes().data()), hello.bytes().size()})) {
     return failed("saying hello");
   }

@@ -32,7 +32,7 @@ class Socket {
 class Line {
  public:
   /// @error Io; NotFound, Limit (as the server says).
-  [[nodiscard]] static Result<Line> open(const Target& target);
+  [[nodiscard]] static Result<Line> open(const Target& target, bool rigid);
   /// A line to something that answers frames, without a handshake.
   explicit Line(Socket socket);
 

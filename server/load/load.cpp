@@ -1,5 +1,6 @@
 #include "server/load/load.h"
 
+#include <pthread.h>
 #include <sys/epoll.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -16,6 +17,7 @@
 #include "server/load/echo.h"
 #include "server/load/line.h"
 #include "server/load/own_server.h"
+#include "server/ws/realtime.h"
 
 namespace spinaltap::load {
 namespace {
@@ -151,6 +153,9 @@ Measured Driver::run(const jobs::Progress& progress) {
       progress("load", std::clamp(std::chrono::duration<double>(now - start).count() / seconds_, 0.0, 1.0));
     }
   }
+  for (const auto& trainee : trainees_) {  // due, and not sent in time
+    for (; trainee->due < end; trainee->due += period_) ++measured_.skipped;
+  }
   measured_.elapsed_s = std::chrono::duration<double>(Clock::now() - start).count();
   const Clock::time_point grace =
       end + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kGrace_s));
@@ -170,6 +175,8 @@ jobs::Figures describe(Measured& measured) {
   const auto& sorted = measured.round_trips_ns;
   return {{"sent", measured.sent},
           {"answered", measured.answered},
+          {"unanswered", measured.sent - measured.answered},
+          {"skipped", measured.skipped},
           {"missed", measured.skipped + (measured.sent - measured.answered)},
           {"late", measured.late},
           {"p50_us", quantile_us(sorted, 0.5)},
@@ -191,7 +198,7 @@ Result<jobs::Figures> drive(const LoadJob& job, const Target& target, const OwnS
                             const jobs::Progress& progress) {
   std::vector<Line> lines;
   for (int i = 0; i < job.sessions; ++i) {
-    auto line = Line::open(target);
+    auto line = Line::open(target, job.rigid);
     if (!line) return tl::unexpected(line.error());
     lines.push_back(std::move(*line));
   }
@@ -242,14 +249,18 @@ Result<jobs::Figures> run(const LoadJob& job, const jobs::Progress& progress) {
     if (!started) return tl::unexpected(started.error());
     server = std::move(*started);
   }
+  const pthread_t here = ::pthread_self();
+  bool granted = false;  // of this side as well, or the generator's own waits would be measured
+  const std::string line = job.realtime ? ws::askForFifo({&here, 1}, granted) : "";
   const auto driven = drive(job, job.target ? *job.target : server->target(), server.get(), progress);
   if (!driven) return driven;
   const std::string realtime = server ? server->realtimeLine() : "";
   server.reset();  // the echo has the machine to itself, as the drill had
   const auto echoed = echo(job, progress);
   if (!echoed) return echoed;
-  jobs::Figures figures{{"sessions", job.sessions}, {"rate_hz", job.rate_hz}, {"seconds", job.seconds}};
-  if (!realtime.empty()) figures["realtime"] = realtime;
+  jobs::Figures figures{
+      {"sessions", job.sessions}, {"rate_hz", job.rate_hz}, {"seconds", job.seconds}, {"rigid", job.rigid}};
+  if (!realtime.empty()) figures["realtime"] = realtime + "; generator: " + line;
   figures.update(*driven);
   for (const auto& [key, value] : echoed->items()) figures["echo_" + key] = value;
   for (const char* key : {"p50_us", "p99_us", "p999_us"}) {

@@ -22,7 +22,8 @@ struct LoadJob {
   double rate_hz = 1000;  ///< poses a second, one a message, of each session
   double seconds = 10;
   std::optional<Target> target;  ///< without one: a server of our own, on loopback, with a block of bone in it
-  bool realtime = false;         ///< of our own server
+  bool rigid = false;            ///< hold the bit without a coupling: less for the core to do
+  bool realtime = false;         ///< of our own server, and of the generator
 };
 
 /// Drives scene `hand` in every session, evenly staggered; then an epoll echo of messages of the same sizes, for at

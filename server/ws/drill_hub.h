@@ -13,7 +13,7 @@ namespace spinaltap::ws {
 
 struct HubOptions {
   LoopOptions loop;
-  std::size_t loops = 0;  ///< 0: half the cores, 1 to 4
+  std::size_t loops = 0;  ///< 0: as many as cores, at most 4; one that is idle costs nothing
   bool realtime = false;  ///< ask for SCHED_FIFO, locked memory and CPUs of their own
 };
 

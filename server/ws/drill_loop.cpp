@@ -1,6 +1,7 @@
 // The turns of the loop: who may read, drill and write next. What messages mean is drill_loop_protocol.cpp.
 #include "server/ws/drill_loop.h"
 
+#include <pthread.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -108,6 +109,7 @@ void DrillLoop::runPosted() {
 }
 
 void DrillLoop::run() {
+  ::pthread_setname_np(::pthread_self(), "live drills");
   std::array<epoll_event, kEvents> events{};
   std::optional<Clock::time_point> until;
   for (;;) {

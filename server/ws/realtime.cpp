@@ -19,18 +19,6 @@ constexpr int kPriority = 20;
 
 std::string refused(int error) { return std::string("refused (") + std::strerror(error) + ")"; }
 
-std::string askForFifo(std::span<const std::thread::native_handle_type> threads, bool& granted) {
-  sched_param parameter{};
-  parameter.sched_priority = kPriority;
-  for (const auto thread : threads) {
-    if (const int error = ::pthread_setschedparam(thread, SCHED_FIFO, &parameter); error != 0) {
-      return "SCHED_FIFO " + refused(error);
-    }
-  }
-  granted = true;
-  return "SCHED_FIFO granted";
-}
-
 std::string askForMemory(bool& granted) {
   // With a limit, later requests for memory would fail instead of being merely not locked.
   rlimit limit{};
@@ -71,6 +59,18 @@ std::string askForCpus(std::span<const std::thread::native_handle_type> threads,
 }
 
 }  // namespace
+
+std::string askForFifo(std::span<const std::thread::native_handle_type> threads, bool& granted) {
+  sched_param parameter{};
+  parameter.sched_priority = kPriority;
+  for (const auto thread : threads) {
+    if (const int error = ::pthread_setschedparam(thread, SCHED_FIFO, &parameter); error != 0) {
+      return "SCHED_FIFO " + refused(error);
+    }
+  }
+  granted = true;
+  return "SCHED_FIFO granted";
+}
 
 RealtimeGrant askForRealtime(std::span<const std::thread::native_handle_type> threads) {
   RealtimeGrant grant;

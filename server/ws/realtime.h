@@ -16,6 +16,9 @@ struct RealtimeGrant {
 /// Asks for SCHED_FIFO and a CPU of its own for each thread, and for locked memory. What is refused is left as it was.
 [[nodiscard]] RealtimeGrant askForRealtime(std::span<const std::thread::native_handle_type> threads);
 
+/// SCHED_FIFO alone. @return one line; `granted` only ever becomes true.
+[[nodiscard]] std::string askForFifo(std::span<const std::thread::native_handle_type> threads, bool& granted);
+
 /// This thread, and those that it starts, yield to the live loops wherever they want the same core.
 void yieldToLiveLoops();
 

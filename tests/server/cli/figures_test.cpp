@@ -308,5 +308,24 @@ TEST(Replay, OfACutRecordingVerifiesWhatIsLeft) {
   EXPECT_EQ(run({"replay", file}).code, 1);
 }
 
+TEST(LoadFigures, AreDocumentedAndEveryPoseIsAnswered) {
+  const auto finished = run({"load", "--sessions", "3", "--rate", "100", "--seconds", "0.5", "--json"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const Json figures = finished.json();
+  expectDocumented("load", figures);
+  EXPECT_GT(figures["sent"], 0);
+  EXPECT_EQ(figures["unanswered"], 0);
+  EXPECT_EQ(figures["echo_unanswered"], 0);
+  EXPECT_EQ(figures["sent"].get<int>() + figures["skipped"].get<int>(), 150) << "each tick is accounted for";
+}
+
+TEST(LoadFigures, SayWhatRealTimeWasGranted) {
+  const auto finished = run({"load", "--sessions", "1", "--rate", "50", "--seconds", "0.2", "--realtime", "--json"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const std::string line = finished.json()["realtime"];
+  const std::regex plain("real time: SCHED_FIFO (granted|refused .*), memory .*; generator: SCHED_FIFO .*");
+  EXPECT_TRUE(std::regex_match(line, plain)) << line;
+}
+
 }  // namespace
 }  // namespace spinaltap::test
