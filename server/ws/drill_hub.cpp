@@ -11,7 +11,8 @@ namespace spinaltap::ws {
 
 Result<std::unique_ptr<DrillHub>> DrillHub::start(store::Store& store, const HubOptions& options) {
   std::unique_ptr<DrillHub> hub(new DrillHub);
-  const std::size_t count = options.loops > 0 ? options.loops : std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 4);
+  const std::size_t count =
+      options.loops > 0 ? options.loops : std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 4);
   for (std::size_t i = 0; i < count; ++i) {
     auto loop = DrillLoop::start(store, *hub->tasks_, options.loop, [&places = *hub](const std::string& id) {
       const std::scoped_lock lock(places.mutex_);

@@ -157,7 +157,9 @@ Result<void> LiveDrill::drill(const wire::Poses& batch, std::size_t from, std::s
     ++state.inputs;
     feedback.seq = batch.first_seq + static_cast<std::uint32_t>(i);
   }
-  feedback.local = haptics::LocalModel{};  // nothing ahead is known yet: of session::Session, once it tells
+  // The answer goes out now. Who holds the bit rigidly moves no bit of its own through the model.
+  const bool wanted = to == batch.poses.size() && state.session.config().coupling.has_value();
+  if (wanted) feedback.local = state.session.localModel();
   return {};
 }
 

@@ -151,6 +151,11 @@ TEST_F(DrillHubTest, AForceComesInTheToolsAndInThePatientsFrameAsThisDeviceCanBe
   EXPECT_LT(norm(feedback.force_N - expected.last.force_N * share), 1e-12);
   EXPECT_LT(norm(feedback.torque_Nmm - expected.last.torque_Nmm * share), 1e-12);
   EXPECT_EQ(feedback.limited, welcome.force_scale * norm(expected.last.force_N) > 0.5);
+  EXPECT_EQ(feedback.local.frontal_mm2, expected.local.frontal_mm2);
+  EXPECT_EQ(feedback.local.rubbing_mm2, expected.local.rubbing_mm2);
+  EXPECT_EQ(feedback.local.side_mm2, expected.local.side_mm2);
+  EXPECT_EQ(feedback.local.side_lever, expected.local.side_lever);
+  EXPECT_GT(feedback.local.frontal_mm2[0], 0) << "or nothing is shown";
   const Frame frame = plan::pathFrame(smallPath());
   const Vec3 path_N = haptics::fromTool(feedback.axis, feedback.force_N);
   EXPECT_LT(norm(feedback.force_patient_N - frame.directionToPatient(path_N)), 1e-15);

@@ -51,6 +51,7 @@ struct Expected {
   std::uint64_t start_hash = 0, hash = 0, cycle = 0, removed_total = 0;
   double thrust_N = 0;
   session::Output last;
+  haptics::LocalModel local;
 };
 
 /// The core alone, in this process.
@@ -69,6 +70,7 @@ inline Expected runLocally(store::Store& store, const SmallCase& small, const st
     expected.last = output;
   }
   expected.hash = session.stateHash();
+  expected.local = session.localModel();
   return expected;
 }
 
