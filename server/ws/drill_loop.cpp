@@ -20,7 +20,7 @@ constexpr auto kHousekeeping = std::chrono::milliseconds(100);
 constexpr auto kHelloTime = std::chrono::seconds(30);
 constexpr auto kPingAfter = std::chrono::seconds(20), kSilence = std::chrono::seconds(60);
 constexpr auto kCloseTime = std::chrono::seconds(5), kGoodbyeTime = std::chrono::seconds(1);
-constexpr auto kOverloadAfter = std::chrono::milliseconds(250), kLate = std::chrono::milliseconds(1);
+constexpr auto kLate = std::chrono::milliseconds(1);
 constexpr std::size_t kEvents = 128;
 
 }  // namespace
@@ -170,17 +170,19 @@ void DrillLoop::serve(Client& client) {
       if (!onFrame(client, frame)) break;
       continue;
     }
-    client.has_backlog = false;
-    if (!client.connection.readable) break;
+    if (!client.connection.readable) {
+      client.has_backlog = false;  // all that came is drilled
+      break;
+    }
     const Connection::Received received = client.deaf ? client.connection.discard() : client.connection.receive();
-    if (received == Connection::Received::Nothing) break;
+    if (received == Connection::Received::Nothing) continue;
     if (received == Connection::Received::Ended) {
       leave(client);
       drop(client.connection.socket());
       return;
     }
     client.heard = now_, client.pinged = false;
-    client.has_backlog = true, client.backlog_since = now_;
+    if (!client.has_backlog) client.has_backlog = true, client.backlog_since = now_;
   }
   if (!client.gone) flush(client);
   if (isDriver() && client.seat->unanswered > 0) {
@@ -266,7 +268,7 @@ void DrillLoop::checkClient(Client& client) {
     flush(client);
   }
   Seat* seat = client.kind == Client::Kind::Driver ? client.seat : nullptr;
-  const bool behind = client.has_backlog && now_ - client.backlog_since > kOverloadAfter;
+  const bool behind = client.has_backlog && now_ - client.backlog_since > options_.overload;
   if (seat && behind && !seat->overloaded) {
     ++metrics_.overloads;
     client.connection.send(wire::SessionStatus{wire::StatusCode::Overload, "poses come faster than they are drilled"});

@@ -23,6 +23,7 @@ namespace spinaltap::ws {
 struct LoopOptions {
   std::chrono::milliseconds patience{60'000};  ///< for a driver who vanished, and for the first to come
   std::chrono::milliseconds stall{10'000};     ///< for a reader who takes nothing
+  std::chrono::milliseconds overload{250};     ///< so long behind what came, and the driver is told
   bool realtime = false;                       ///< what welcome says: granted
 };
 

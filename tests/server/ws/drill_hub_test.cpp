@@ -463,7 +463,9 @@ TEST_F(DrillHubTest, EverySessionHasItsTurnWhileAnotherIsFlooded) {
     for (; !ends; ++seq) EXPECT_EQ(drill(*modest, seq, {session::Input{}}).seq, seq);
   });
   std::thread reader([&] {
-    for (wire::Feedback last; last.seq + 1 != kBatches * kPoses; last = next<wire::Feedback>(*greedy)) {
+    for (std::uint32_t seq_read = 0; seq_read + 1 != kBatches * kPoses;) {
+      const auto message = wire::decodeServerMessage(greedy->receive().payload).value();
+      if (const auto* feedback = std::get_if<wire::Feedback>(&message)) seq_read = feedback->seq;  // else: overload
     }
   });
   const std::vector<session::Input> batch(kPoses);
@@ -474,6 +476,27 @@ TEST_F(DrillHubTest, EverySessionHasItsTurnWhileAnotherIsFlooded) {
   EXPECT_GT(seq, kBatches * kPoses / DrillLoop::kSlice / 8);
   ends = true;
   trainee.join();
+}
+
+TEST_F(DrillHubTest, WhoSendsFasterThanItIsDrilledIsToldSo) {
+  options_.loop.overload = milliseconds(1);
+  const auto socket = connect();
+  drive(*socket);
+  std::atomic<bool> told = false;
+  std::thread sender([&] {
+    const std::vector<session::Input> batch(wire::kMaxPosesPerBatch);
+    const auto size = static_cast<std::uint32_t>(batch.size());
+    for (std::uint32_t i = 0; i < 5000 && !told; ++i) socket->send(posesBytes(i * size, batch));
+  });
+  while (!told) {
+    const auto message = wire::decodeServerMessage(socket->receive().payload);
+    if (!message) break;
+    const auto* status = std::get_if<wire::SessionStatus>(&*message);
+    told = status && status->code == wire::StatusCode::Overload;
+  }
+  EXPECT_TRUE(told);
+  told = true;
+  sender.join();
 }
 
 }  // namespace
