@@ -253,11 +253,11 @@ Result<jobs::Figures> run(const LoadJob& job, const jobs::Progress& progress) {
   bool granted = false;  // of this side as well, or the generator's own waits would be measured
   const std::string line = job.realtime ? ws::askForFifo({&here, 1}, granted) : "";
   const auto driven = drive(job, job.target ? *job.target : server->target(), server.get(), progress);
-  if (!driven) return driven;
+  if (!driven) return tl::unexpected(driven.error());
   const std::string realtime = server ? server->realtimeLine() : "";
   server.reset();  // the echo has the machine to itself, as the drill had
   const auto echoed = echo(job, progress);
-  if (!echoed) return echoed;
+  if (!echoed) return tl::unexpected(echoed.error());
   jobs::Figures figures{
       {"sessions", job.sessions}, {"rate_hz", job.rate_hz}, {"seconds", job.seconds}, {"rigid", job.rigid}};
   if (!realtime.empty()) figures["realtime"] = realtime + "; generator: " + line;

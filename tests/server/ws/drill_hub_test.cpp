@@ -410,7 +410,7 @@ TEST_F(DrillHubTest, ADriverWhoReadsNothingIsAnsweredByTheNewestAndLosesNoHashOr
   session::Status worst = session::Status::Ok;
   std::uint32_t answers = 0;
   while (last.seq + 1 < kPoses) {
-    last = next<wire::Feedback>(*socket);
+    last = nextFeedback(*socket);
     worst = std::max(worst, last.status);
     ++answers;
   }
@@ -432,7 +432,7 @@ TEST_F(DrillHubTest, FeedbackComesNoOftenerThanTheClientTakesIt) {
     std::this_thread::sleep_for(milliseconds(1));
   }
   int answers = 0;
-  for (wire::Feedback last; last.seq != 299; ++answers) last = next<wire::Feedback>(*socket);
+  for (wire::Feedback last; last.seq != 299; ++answers) last = nextFeedback(*socket);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   EXPECT_LE(answers, 20 * seconds + 2) << "the first at once, and the one under way";
   EXPECT_GE(answers, 2);
@@ -463,9 +463,7 @@ TEST_F(DrillHubTest, EverySessionHasItsTurnWhileAnotherIsFlooded) {
     for (; !ends; ++seq) EXPECT_EQ(drill(*modest, seq, {session::Input{}}).seq, seq);
   });
   std::thread reader([&] {
-    for (std::uint32_t seq_read = 0; seq_read + 1 != kBatches * kPoses;) {
-      const auto message = wire::decodeServerMessage(greedy->receive().payload).value();
-      if (const auto* feedback = std::get_if<wire::Feedback>(&message)) seq_read = feedback->seq;  // else: overload
+    while (nextFeedback(*greedy).seq + 1 != kBatches * kPoses) {
     }
   });
   const std::vector<session::Input> batch(kPoses);

@@ -81,4 +81,14 @@ Message decoded(const Bytes& bytes) {
   return message && std::holds_alternative<Message>(*message) ? std::get<Message>(*message) : Message{};
 }
 
+/// The next feedback: a slow machine may say in between that it is behind.
+template <class Socket>
+wire::Feedback nextFeedback(Socket& socket) {
+  Bytes bytes = socket.receive().payload;
+  for (; !bytes.empty() && bytes[0] == static_cast<std::byte>(wire::MessageType::Status);) {
+    bytes = socket.receive().payload;
+  }
+  return decoded<wire::Feedback>(bytes);
+}
+
 }  // namespace spinaltap::test

@@ -236,7 +236,7 @@ TEST_F(LiveDrill, ATraineeWhoReadsNothingIsAnsweredWithTheNewestAndCostsNoMemory
   std::ignore = decoded<wire::Welcome>(socket.receive().payload);
   std::uint32_t answers = 0, seq = 0;
   for (bool first = true; seq + 1 < kBatches; first = false) {
-    const auto feedback = decoded<wire::Feedback>(socket.receive().payload);
+    const auto feedback = nextFeedback(socket);
     ASSERT_TRUE(first || feedback.seq > seq) << "never an older one after a newer one";
     seq = feedback.seq;
     ++answers;
