@@ -20,8 +20,9 @@ using point_volume::PointVolume;
 
 constexpr double kTick_s = 5e-5;  // of the hand, and of the reference
 constexpr double kSpacing_mm = 0.2, kRadius_mm = 2.4, kStart_mm = -0.5;
-constexpr double kFeed_mm_s = 2, kLeanTo_mm = 30, kWallPull_mm = 3;
-constexpr double kSlow_s = 0.1;  // what swings faster than that is no course
+constexpr double kFeed_mm_s = 2, kLeanTo_mm = 50, kWallPull_mm = 3;
+constexpr std::size_t kMostWait = 100'000;  // ticks: 5 s, for delays of a second and losses
+constexpr double kSlow_s = 0.1;             // what swings faster than that is no course
 
 struct Layer {
   double thick_mm;
@@ -133,11 +134,18 @@ class Loop {
     local_.place({hand_.at_mm(), {0, 0, 1}});
   }
 
-  /// One tick; true when the device's loop ran.
+  /// Until the session has answered the hand waits in the air; then the course begins. Ticks of time that it took.
+  std::size_t greet() {
+    std::size_t ticks = 0;
+    for (; !answered_ && ticks < kMostWait; ++ticks) exchange(static_cast<double>(ticks) * kTick_s);
+    begun_s_ = static_cast<double>(ticks) * kTick_s;
+    return ticks;
+  }
+
   void tick(double now_s) {
-    if (now_s + 1e-9 >= next_s_) device(now_s);
+    exchange(now_s);
     const Vec3 before = hand_.at_mm();
-    hand_.step(meantAt(case_, now_s), {}, force_N_, kTick_s);
+    hand_.step(meantAt(case_, now_s - begun_s_), {}, force_N_, kTick_s);
     given_mJ_ += dot(force_N_, hand_.at_mm() - before);
     most_given_mJ_ = std::max(most_given_mJ_, given_mJ_);
   }
@@ -150,11 +158,17 @@ class Loop {
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
 
  private:
+  /// The session answers when a pose comes, whenever that is; the device looks for answers once a period.
+  void exchange(double now_s) {
+    server(now_s);
+    if (now_s + 1e-9 >= next_s_) device(now_s);
+  }
+
   void device(double now_s) {
     const double period_s = 1 / case_.rate_hz;
     next_s_ += period_s;
     session::Input input;
-    input.t_us = static_cast<std::uint64_t>(now_s * 1e6 + 0.5);
+    input.t_us = static_cast<std::uint64_t>(std::llround(now_s * 1e6));
     input.tip_mm = hand_.at_mm();
     input.spinning = case_.spinning;
     there_.send(now_s, {++seq_, input}, lost_);
@@ -192,7 +206,7 @@ class Loop {
   Line<Pose> there_;
   Line<Answer> back_;
   Vec3 force_N_, last_N_;
-  double next_s_ = 0, depth_mm_ = kStart_mm, given_mJ_ = 0, most_given_mJ_ = 0;
+  double next_s_ = 0, begun_s_ = 0, depth_mm_ = kStart_mm, given_mJ_ = 0, most_given_mJ_ = 0;
   std::uint32_t seq_ = 0, answered_seq_ = 0;
   bool answered_ = false;
   std::uint64_t late_ = 0, lost_ = 0;
@@ -225,8 +239,9 @@ Result<Loop> loopOf(const HapticCase& c) {
 Course follow(Loop& loop, double seconds) {
   Course course;
   const auto ticks = static_cast<std::size_t>(seconds / kTick_s);
+  const std::size_t waited = loop.greet();
   for (std::size_t i = 0; i < ticks; ++i) {
-    loop.tick(static_cast<double>(i) * kTick_s);
+    loop.tick(static_cast<double>(waited + i) * kTick_s);
     course.at_mm.push_back(loop.at_mm().z);
     course.force_N.push_back(loop.force_N().z);
     course.depth_mm.push_back(loop.depth_mm());
@@ -304,12 +319,15 @@ Result<double> stiffestStable_N_mm(HapticCase haptic_case) {
     const Course course = follow(*loop, haptic_case.seconds);
     return swingOf(course.at_mm) < 0.02;
   };
-  double low = 0.05, high = 200;
-  for (const double end : {low, high}) {
-    const Result<bool> stable = isStable(end);
+  // Upwards until one swings: a guard may bring to rest what is much too stiff, and not what is a little too stiff.
+  constexpr double kMost = 200, kApart = 1.5;
+  double low = 0, high = 0.05;
+  for (;; low = high, high = std::min(kMost, kApart * high)) {
+    const Result<bool> stable = isStable(high);
     if (!stable) return tl::unexpected(stable.error());
-    if (end == low && !*stable) return 0.0;
-    if (end == high && *stable) return high;
+    if (*stable && high < kMost) continue;
+    if (*stable || low == 0) return *stable ? high : 0.0;
+    break;
   }
   while (high > 1.05 * low) {
     const double middle = std::sqrt(low * high);

@@ -13,12 +13,13 @@ namespace spinaltap::tradeoff {
 
 /// What is drilled: solid cortex, solid cancellous bone, or a vertebra's layers and out of the far side.
 enum class Bone : std::uint8_t { Cortex, Cancellous, ThroughTheWall };
-/// Who holds the drill. Relaxed and Tense follow a feed of 2 mm/s; Leaning pushes with 15 N
-/// that fade out 30 mm beyond the entry; Trembling is relaxed with a tremor of 0.2 mm at 9 Hz.
+/// Who holds the drill. Relaxed and Tense follow a feed of 2 mm/s; Leaning pushes with 25 N
+/// that fade out 50 mm beyond the entry; Trembling is relaxed with a tremor of 0.2 mm at 9 Hz.
 enum class Holding : std::uint8_t { Relaxed, Tense, Leaning, Trembling };
 [[nodiscard]] std::string_view nameOf(Bone bone);
 [[nodiscard]] std::string_view nameOf(Holding holding);
 
+/// A course begins once the session has answered: whoever comes to bone has been in touch before.
 struct HapticCase {
   Bone bone = Bone::Cancellous;
   Holding holding = Holding::Relaxed;
@@ -62,8 +63,8 @@ struct Course {
                                            HapticTrace* trace = nullptr);
 
 /// The stiffest coupling, N/mm, with which a relaxed hand that is drawn 3 mm into a wall (a bit that does not turn)
-/// comes to rest: swinging by less than 0.02 mm in the last quarter of 1.5 s. By bisection, to 5 %; 0 when even 0.05
-/// N/mm swings, 200 when nothing does.
+/// comes to rest, as do all less stiff ones: swinging by less than 0.02 mm in the last quarter of 1.5 s. Sought upwards
+/// in steps of half, then to 5 %; 0 when even 0.05 N/mm swings, 200 when nothing does.
 [[nodiscard]] Result<double> stiffestStable_N_mm(HapticCase haptic_case);
 
 }  // namespace spinaltap::tradeoff
