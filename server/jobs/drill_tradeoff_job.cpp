@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,7 +12,6 @@
 #include "server/jobs/drill_tradeoff_page.h"
 #include "server/jobs/words.h"
 #include "server/plots/svg.h"
-#include "server/store/blob_store.h"
 
 namespace spinaltap::jobs {
 namespace {
@@ -33,16 +30,6 @@ std::string processorName() {
     if (line.rfind("model name", 0) == 0 && colon != std::string::npos) return line.substr(colon + 2);
   }
   return {};
-}
-
-/// Minutes of measuring are not to be lost because the page has no place.
-Result<void> checkPage(const std::string& html) {
-  namespace fs = std::filesystem;
-  const fs::path page(html), folder = page.has_parent_path() ? page.parent_path() : fs::path(".");
-  std::error_code ignored;
-  if (html.empty() || (fs::is_directory(folder, ignored) && !fs::is_directory(page, ignored))) return {};
-  return fail(ErrorCode::Io, "trade-off: cannot write " + html + ": " +
-                                 (fs::is_directory(folder, ignored) ? "it is a folder" : "there is no such folder"));
 }
 
 Result<void> check(const DrillTradeoffJob& job) {
@@ -194,22 +181,22 @@ Result<std::vector<std::uint64_t>> tornBySingle(const DrillTradeoffJob& job) {
 }
 
 constexpr std::array kColumns{
-    DrillColumn{"mm", "spacing_mm", "spacing of the points"},
-    DrillColumn{"reals", "precision", "the predicate's arithmetic"},
-    DrillColumn{"threads", "threads", "that share a cycle"},
-    DrillColumn{"MB", "memory_mb", "memory of point volume and engine"},
-    DrillColumn{"build s", "build_s", "to build the point volume of a path of this length in the phantom"},
-    DrillColumn{"p50 us", "median_us", "a cycle, median"},
-    DrillColumn{"p99.9 us", "p999_us", "a cycle that one in a thousand exceeds"},
-    DrillColumn{"as met", "met_p999_us", "the same of all runs, not the fastest: what the machine made of it, us"},
-    DrillColumn{"cycles/s", "cycles_per_s", "of the median cycle"},
-    DrillColumn{"at p99.9", "cycles_per_s_p999", "cycles a second, of the p99.9 cycle"},
-    DrillColumn{"volume %", "removed_error_percent", "error of the removed volume against the swept one"},
-    DrillColumn{"mass %", "cycle_error_percent", "error of the mass removed a cycle, mean"},
-    DrillColumn{"ripple %", "ripple_percent", "its standard deviation from what is swept, cycle by cycle"},
-    DrillColumn{"20 ms %", "ripple_smoothed_percent", "the same after smoothing over 20 ms"},
-    DrillColumn{"differ", "differing", "points that end otherwise than in the first row of this spacing"},
-    DrillColumn{"on", "differing_on",
+    TableColumn{"mm", "spacing_mm", "spacing of the points"},
+    TableColumn{"reals", "precision", "the predicate's arithmetic"},
+    TableColumn{"threads", "threads", "that share a cycle"},
+    TableColumn{"MB", "memory_mb", "memory of point volume and engine"},
+    TableColumn{"build s", "build_s", "to build the point volume of a path of this length in the phantom"},
+    TableColumn{"p50 us", "median_us", "a cycle, median"},
+    TableColumn{"p99.9 us", "p999_us", "a cycle that one in a thousand exceeds"},
+    TableColumn{"as met", "met_p999_us", "the same of all runs, not the fastest: what the machine made of it, us"},
+    TableColumn{"cycles/s", "cycles_per_s", "of the median cycle"},
+    TableColumn{"at p99.9", "cycles_per_s_p999", "cycles a second, of the p99.9 cycle"},
+    TableColumn{"volume %", "removed_error_percent", "error of the removed volume against the swept one"},
+    TableColumn{"mass %", "cycle_error_percent", "error of the mass removed a cycle, mean"},
+    TableColumn{"ripple %", "ripple_percent", "its standard deviation from what is swept, cycle by cycle"},
+    TableColumn{"20 ms %", "ripple_smoothed_percent", "the same after smoothing over 20 ms"},
+    TableColumn{"differ", "differing", "points that end otherwise than in the first row of this spacing"},
+    TableColumn{"on", "differing_on",
                 "the same against double in the scene on, where a ring is exactly as wide as the bit"}};
 
 }  // namespace
@@ -244,8 +231,7 @@ Result<Figures> drillTradeoff(const DrillTradeoffJob& job, const Progress& progr
   if (best) figures["recommended_row"] = *best;
   figures["recommendation"] = adviceOn(*rows, wanted, best);
   if (!job.html.empty()) {
-    const std::string page = drillTradeoffPage(figures);
-    const auto written = store::replaceFile(job.html, std::as_bytes(std::span(page)));
+    const auto written = writePage(job.html, drillTradeoffPage(figures));
     if (!written) return tl::unexpected(written.error());
     figures["html"] = job.html;
   }
@@ -253,35 +239,10 @@ Result<Figures> drillTradeoff(const DrillTradeoffJob& job, const Progress& progr
   return figures;
 }
 
-std::span<const DrillColumn> drillColumns() { return kColumns; }
-
-std::string drillCell(const Figures& row, const DrillColumn& column) {
-  const Figures& value = row[column.key];
-  if (value.is_string()) return value.get<std::string>();
-  const double number = value.get<double>();
-  const bool is_error = std::string_view(column.key).find("_error_") != std::string_view::npos;
-  if (std::abs(number) >= 1000) {
-    if (!value.is_number_float()) return value.dump();
-    const double scale = std::pow(10, std::floor(std::log10(std::abs(number))) - 2);  // three significant digits
-    return std::to_string(std::llround(std::round(number / scale) * scale));
-  }
-  const std::string text = shortNumber(number);
-  return is_error && number > 0 ? std::string("+").append(text) : text;
-}
+std::span<const TableColumn> drillColumns() { return kColumns; }
 
 std::string drillTradeoffTable(const Figures& figures) {
-  constexpr std::size_t kWide = 9;
-  std::string out;
-  const auto put = [&](const std::string& text) {
-    out.append(text.size() < kWide ? kWide - text.size() : 1, ' ');
-    out += text;
-  };
-  for (const DrillColumn& column : kColumns) put(column.title);
-  out += '\n';
-  for (const Figures& row : figures["rows"]) {
-    for (const DrillColumn& column : kColumns) put(drillCell(row, column));
-    out += '\n';
-  }
+  std::string out = textTable(kColumns, figures["rows"]);
   const auto number = [&](const char* key) { return shortNumber(figures[key].get<double>()); };
   out += "\nScene " + figures["scene"].get<std::string>() + " over " + number("length_mm") + " mm, " +
          number("cycles") + " cycles, each with its fastest of " + number("repeats") +

@@ -7,6 +7,7 @@
 #include "core/base/result.h"
 #include "core/session/scenes.h"
 #include "server/jobs/figures.h"
+#include "server/jobs/tradeoff_page.h"
 
 namespace spinaltap::jobs {
 
@@ -32,12 +33,6 @@ inline constexpr double kMostMemory_mb = 1000;
 /// For people: the rows, aligned, what they mean, and the recommendation.
 [[nodiscard]] std::string drillTradeoffTable(const Figures& figures);
 
-/// A column, in the program's table and in the page's.
-struct DrillColumn {
-  const char *title, *key, *meaning;
-};
-[[nodiscard]] std::span<const DrillColumn> drillColumns();
-/// A row's figure as people read it; errors with their sign.
-[[nodiscard]] std::string drillCell(const Figures& row, const DrillColumn& column);
+[[nodiscard]] std::span<const TableColumn> drillColumns();
 
 }  // namespace spinaltap::jobs

@@ -4,11 +4,12 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "server/jobs/drill_tradeoff_job.h"
-#include "server/plots/chart.h"
+#include "server/jobs/tradeoff_page.h"
 
 namespace spinaltap::jobs {
 namespace {
@@ -16,68 +17,7 @@ namespace {
 using plots::escaped;
 using plots::shortNumber;
 
-/// A colour of the charts, which are drawn for white paper, and what stands for it on a dark page.
-struct Colour {
-  std::string_view light, dark;
-};
-constexpr Colour kBlue{"#1668b8", "#62b5ff"}, kRed{"#b23a26", "#ff8a78"};
-constexpr std::array kColours{kBlue,
-                              kRed,
-                              Colour{"white", "#16191d"},
-                              Colour{"#e4e4e4", "#343a41"},
-                              Colour{"#888", "#7d858e"},
-                              Colour{"#222", "#dfe3e8"},
-                              Colour{"#111", "#f1f3f5"},
-                              Colour{"#555", "#aab2bb"}};
-
-constexpr std::string_view kStyle = R"(
-:root { color-scheme: light dark; --ink: #1d2126; --soft: #555c64; --page: #fff; --line: #d5d9de; --mark: #e4f0fc; }
-body { margin: 0; background: var(--page); color: var(--ink); font: 16px/1.5 system-ui, Helvetica, Arial, sans-serif; }
-main { max-width: 84rem; margin: 0 auto; padding: 1.5rem; }
-h1 { font-size: 1.6rem; margin: 0 0 .5rem; } h2 { font-size: 1.2rem; margin: 2rem 0 .5rem; }
-.advice { border-left: .3rem solid #1668b8; background: var(--mark); padding: .6rem 1rem; margin: 1rem 0; }
-.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 22rem), 1fr)); gap: 1.2rem; }
-figure { margin: 0; } figcaption { color: var(--soft); font-size: .9rem; } svg { width: 100%; height: auto; }
-.scroll { overflow-x: auto; } .scroll:focus-visible { outline: .15rem solid #1668b8; outline-offset: .15rem; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .85rem; }
-caption { text-align: left; color: var(--soft); padding-bottom: .4rem; }
-th, td { padding: .25rem .35rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
-thead th { border-bottom: 2px solid var(--line); } tr.best { background: var(--mark); }
-dt { font-weight: 600; float: left; clear: left; width: 7rem; } dd { margin: 0 0 .2rem 7.5rem; }
-@media (prefers-color-scheme: dark) {
-:root { --ink: #dfe3e8; --soft: #aab2bb; --page: #16191d; --line: #343a41; --mark: #1c2c3c; }
-)";
-
-std::string style() {
-  std::string out(kStyle);
-  for (const Colour& colour : kColours) {
-    for (const std::string_view property : {"fill", "stroke"}) {
-      for (const std::string_view part :
-           {std::string_view("svg ["), property, std::string_view("=\""), colour.light, std::string_view("\"] { "),
-            property, std::string_view(": "), colour.dark, std::string_view("; }\n")}) {
-        out += part;
-      }
-    }
-  }
-  return out + "}\n";
-}
-
 double number(const Figures& row, const char* key) { return row[key].get<double>(); }
-
-/// A line of a chart: some rows' figure against their spacing.
-struct Line {
-  std::string name;
-  Colour colour;
-  std::string_view dash;
-  std::vector<plots::Place> points;
-};
-
-struct Chart {
-  std::string title, unit, caption;
-  std::vector<Line> lines;
-  double level = 0;  ///< a level across, if positive
-  std::string level_name;
-};
 
 /// Ticks at what was measured; of places too close together for their numbers, the finest.
 std::vector<double> ticksAt(const plots::Axis& axis, std::vector<double> places) {
@@ -90,43 +30,27 @@ std::vector<double> ticksAt(const plots::Axis& axis, std::vector<double> places)
   return ticks;
 }
 
-std::string drawn(const Chart& chart) {
-  std::vector<double> xs, ys;
-  for (const Line& line : chart.lines) {
-    for (const plots::Place& p : line.points) xs.push_back(p[0]), ys.push_back(p[1]);
+/// By spacing.
+std::string drawn(const PageChart& chart) {
+  std::vector<double> xs;
+  for (const PageLine& line : chart.lines) {
+    for (const plots::Place& p : line.points) xs.push_back(p[0]);
   }
-  if (chart.level > 0) ys.push_back(chart.level);
-  const plots::Axis y = plots::axisFor(chart.unit, ys, true, false);
   plots::Axis x = plots::axisFor("spacing, mm", xs, true, false);
   x.ticks = ticksAt(x, xs);
-  std::vector<plots::Series> series;
-  for (const Line& line : chart.lines)
-    series.push_back({line.name, line.colour.light, line.points, {}, true, line.dash});
-  const plots::Panel panel{{70, 36}, 370, 240, chart.title};
-  plots::Svg svg(460, chart.lines.size() > 2 ? 368 : 350);
-  plots::drawPoints(svg, panel, x, y, series);
-  if (chart.level > 0) plots::drawLevel(svg, panel, y, chart.level, chart.level_name);
-  for (std::size_t n = 0; n < chart.lines.size(); ++n) {  // two names a row, at most two rows
-    const Line& line = chart.lines[n];
-    const double left = panel.corner[0] + (n % 2 == 0 ? 0 : 0.5 * panel.width);
-    const double at = n < 2 ? 338 : 356;
-    svg.line({left, at}, {left + 26, at}, {line.colour.light, 2, line.dash});
-    svg.text({left + 32, at + 4}, line.name, {12});
-  }
-  return "<figure>\n" + svg.str(chart.title + ". " + chart.caption) + "<figcaption>" + escaped(chart.caption) +
-         "</figcaption>\n</figure>\n";
+  return figureOf(chart, x);
 }
 
 /// One line for each setting that differs in what is told apart, by spacing.
-std::vector<Line> linesOf(const Figures& rows, const char* key, bool by_precision, bool by_threads) {
-  std::vector<Line> lines;
+std::vector<PageLine> linesOf(const Figures& rows, const char* key, bool by_precision, bool by_threads) {
+  std::vector<PageLine> lines;
   for (const Figures& row : rows) {
     const std::string precision = row["precision"];
     const int threads = row["threads"];
     std::string name = by_precision ? precision : "";
     if (by_threads)
       name += (name.empty() ? "" : ", ") + std::to_string(threads) + (threads == 1 ? " thread" : " threads");
-    auto line = std::find_if(lines.begin(), lines.end(), [&](const Line& l) { return l.name == name; });
+    auto line = std::find_if(lines.begin(), lines.end(), [&](const PageLine& l) { return l.name == name; });
     if (line == lines.end()) {
       const bool single = by_precision && precision == "single", dashed = by_threads ? threads != 1 : single;
       line = lines.insert(lines.end(), {name, single ? kRed : kBlue, dashed ? "6 3" : "", {}});
@@ -136,19 +60,19 @@ std::vector<Line> linesOf(const Figures& rows, const char* key, bool by_precisio
         std::any_of(line->points.begin(), line->points.end(), [&](const plots::Place& p) { return p[0] == x; });
     if (!there && y > 0) line->points.push_back({x, y});
   }
-  for (Line& line : lines) std::sort(line.points.begin(), line.points.end());  // asked for in any order
+  for (PageLine& line : lines) std::sort(line.points.begin(), line.points.end());  // asked for in any order
   return lines;
 }
 
-std::vector<Chart> chartsOf(const Figures& figures) {
+std::vector<PageChart> chartsOf(const Figures& figures) {
   const Figures& rows = figures["rows"];
   const std::string budget =
       shortNumber(number(figures, "rate_hz")) + " Hz, headroom " + shortNumber(number(figures, "headroom"));
-  const auto shared = [&](Line line, const char* name, std::string_view dash) {
+  const auto shared = [&](PageLine line, const char* name, std::string_view dash) {
     line.name = name, line.dash = dash;
     return line;
   };
-  std::vector<Chart> charts{
+  std::vector<PageChart> charts{
       {"A cycle, p99.9", "microseconds", "One cycle in a thousand takes longer. Below the dotted line the rate holds.",
        linesOf(rows, "p999_us", true, true), number(figures, "budget_us"), budget},
       {"A cycle, median", "microseconds", "Half of the cycles take longer.", linesOf(rows, "median_us", true, true), 0,
@@ -158,7 +82,7 @@ std::vector<Chart> chartsOf(const Figures& figures) {
        "Against the swept volume, without its sign. Below the dotted line nothing is certain.",
        {shared(linesOf(rows, "removed_error_percent", false, false)[0], "all of the hole", ""),
         [&] {
-          Line line = shared(linesOf(rows, "cycle_error_percent", false, false)[0], "a cycle's mass, mean", "6 3");
+          PageLine line = shared(linesOf(rows, "cycle_error_percent", false, false)[0], "a cycle's mass, mean", "6 3");
           line.colour = kRed;
           return line;
         }()},
@@ -169,7 +93,8 @@ std::vector<Chart> chartsOf(const Figures& figures) {
        "How unevenly an even motion meets the points.",
        {shared(linesOf(rows, "ripple_percent", false, false)[0], "each cycle", ""),
         [&] {
-          Line line = shared(linesOf(rows, "ripple_smoothed_percent", false, false)[0], "smoothed over 20 ms", "6 3");
+          PageLine line =
+              shared(linesOf(rows, "ripple_smoothed_percent", false, false)[0], "smoothed over 20 ms", "6 3");
           line.colour = kRed;
           return line;
         }()},
@@ -181,31 +106,11 @@ std::vector<Chart> chartsOf(const Figures& figures) {
   return charts;
 }
 
-std::string cellsOf(const Figures& row, bool best) {
-  std::string out;
-  for (const DrillColumn& column : drillColumns()) {
-    const std::string text = escaped(drillCell(row, column));
-    if (&column == &drillColumns().front()) {
-      out += "<th scope=\"row\">" + text + (best ? " <small>recommended</small>" : "") + "</th>";
-    } else {
-      out += "<td>" + text + "</td>";
-    }
-  }
-  return out;
-}
-
 std::string tableOf(const Figures& figures) {
-  std::string out =
-      "<div class=\"scroll\" role=\"region\" aria-labelledby=\"rows\" tabindex=\"0\">\n<table>\n<caption "
-      "id=\"rows\">Every "
-      "setting that was measured; what the columns mean stands below.</caption>\n<thead><tr>";
-  for (const DrillColumn& column : drillColumns()) out += "<th scope=\"col\">" + escaped(column.title) + "</th>";
-  out += "</tr></thead>\n<tbody>\n";
-  for (std::size_t n = 0; n < figures["rows"].size(); ++n) {
-    const bool best = figures.contains("recommended_row") && figures["recommended_row"] == n;
-    out += (best ? "<tr class=\"best\">" : "<tr>") + cellsOf(figures["rows"][n], best) + "</tr>\n";
-  }
-  return out + "</tbody>\n</table>\n</div>\n";
+  std::optional<std::size_t> best;
+  if (figures.contains("recommended_row")) best = figures["recommended_row"].get<std::size_t>();
+  return htmlTable(drillColumns(), figures["rows"], "rows",
+                   "Every setting that was measured; what the columns mean stands below.", best);
 }
 
 /// Single against double, at each spacing and number of threads.
@@ -239,14 +144,6 @@ std::string singleOf(const Figures& figures) {
   return out + "</tbody>\n</table>\n</div>\n";
 }
 
-std::string meaningsOf() {
-  std::string out = "<dl>\n";
-  for (const DrillColumn& column : drillColumns()) {
-    out += "<dt>" + escaped(column.title) + "</dt><dd>" + escaped(column.meaning) + "</dd>\n";
-  }
-  return out + "</dl>\n";
-}
-
 std::string howOf(const Figures& f) {
   const auto text = [&](const char* key) { return shortNumber(number(f, key)); };
   std::string where = f["processor"].get<std::string>();
@@ -269,20 +166,14 @@ std::string howOf(const Figures& f) {
 }  // namespace
 
 std::string drillTradeoffPage(const Figures& figures) {
-  std::string out =
-      "<!DOCTYPE html>\n<html lang=\"en\" xmlns=\"http://www.w3.org/1999/xhtml\">\n<head>\n<meta "
-      "charset=\"utf-8\"/>\n<meta "
-      "name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>SpinalTap: speed for accuracy in "
-      "drilling</title>\n<style>" +
-      style() + "</style>\n</head>\n<body>\n<main>\n<h1>Drilling: speed for accuracy</h1>\n";
-  out +=
-      "<p class=\"advice\">" + escaped(figures["recommendation"].get<std::string>()) + "</p>\n<div class=\"charts\">\n";
-  for (const Chart& chart : chartsOf(figures)) out += drawn(chart);
-  out += "</div>\n<h2>Every setting</h2>\n" + tableOf(figures);
-  out += "<h2>What single precision costs and gains</h2>\n" + singleOf(figures);
-  out += "<h2>What the columns mean</h2>\n" + meaningsOf();
-  out += "<h2>How it was measured</h2>\n" + howOf(figures);
-  return out + "</main>\n</body>\n</html>\n";
+  std::string body = "<div class=\"charts\">\n";
+  for (const PageChart& chart : chartsOf(figures)) body += drawn(chart);
+  body += "</div>\n<h2>Every setting</h2>\n" + tableOf(figures);
+  body += "<h2>What single precision costs and gains</h2>\n" + singleOf(figures);
+  body += "<h2>What the columns mean</h2>\n" + meaningsOf(drillColumns());
+  body += "<h2>How it was measured</h2>\n" + howOf(figures);
+  const std::array advice{figures["recommendation"].get<std::string>()};
+  return pageOf("speed for accuracy in drilling", "Drilling: speed for accuracy", advice, body);
 }
 
 }  // namespace spinaltap::jobs

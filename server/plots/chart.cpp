@@ -28,10 +28,12 @@ void drawY(Svg& svg, const Panel& p, const Axis& y) {
 }
 
 void drawX(Svg& svg, const Panel& p, const Axis& x) {
-  for (const double tick : ticksOf(x)) {
-    const double at = xOf(p, x, tick);
+  const std::vector<double> ticks = ticksOf(x);
+  for (std::size_t n = 0; n < ticks.size(); ++n) {
+    const double at = xOf(p, x, ticks[n]);
     svg.line({at, p.corner[1]}, {at, p.corner[1] + p.height}, kGrid);
-    svg.text({at, p.corner[1] + p.height + 16}, shortNumber(tick), {11, Anchor::Middle});
+    svg.text({at, p.corner[1] + p.height + 16}, n < x.names.size() ? x.names[n] : shortNumber(ticks[n]),
+             {11, Anchor::Middle});
   }
   svg.text({p.corner[0] + p.width / 2, p.corner[1] + p.height + 36}, x.title, {12, Anchor::Middle});
 }
@@ -65,7 +67,7 @@ class Labels {
 }  // namespace
 
 Axis axisFor(std::string title, const std::vector<double>& values, bool logarithmic, bool from_zero) {
-  Axis axis{std::move(title), 0, 1, false, {}};
+  Axis axis{std::move(title), 0, 1, false, {}, {}};
   std::vector<double> finite;
   std::copy_if(values.begin(), values.end(), std::back_inserter(finite), [](double v) { return std::isfinite(v); });
   if (finite.empty()) return axis;
@@ -112,7 +114,9 @@ void drawPoints(Svg& svg, const Panel& panel, const Axis& x, const Axis& y, cons
     std::vector<Place> places;
     for (const Place& p : s.points) places.push_back({xOf(panel, x, p[0]), yOf(panel, y, p[1])});
     if (s.joined && places.size() > 1) svg.polyline(places, {s.colour, 1.5, s.dash});
-    for (const Place& p : places) svg.circle(p, 4.5, s.colour, "white");
+    for (const Place& p : places) {
+      if (s.dots) svg.circle(p, 4.5, s.colour, "white");
+    }
   }
   for (const Series& s : series) {
     for (std::size_t n = 0; n < s.labels.size(); ++n) {

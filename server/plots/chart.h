@@ -11,8 +11,9 @@ namespace spinaltap::plots {
 struct Axis {
   std::string title;  ///< with its unit
   double low = 0, high = 1;
-  bool logarithmic = false;        ///< then low > 0
-  std::vector<double> ticks = {};  ///< where they stand; empty: at round places
+  bool logarithmic = false;             ///< then low > 0
+  std::vector<double> ticks = {};       ///< where they stand; empty: at round places
+  std::vector<std::string> names = {};  ///< one a tick; empty: their numbers
 };
 
 /// An axis that holds these values, with a little room; logarithmic when asked and all are positive. Bars want zero.
@@ -28,6 +29,7 @@ struct Series {
   std::vector<std::string> labels;  ///< one a point, or none
   bool joined = false;              ///< by a line, in the order given
   std::string_view dash = {};       ///< of that line, as stroke-dasharray; empty: none
+  bool dots = true;                 ///< at the points
 };
 
 /// One panel of a page: where it lies, what it is about.

@@ -66,6 +66,19 @@ TEST(Page, EscapesWhatANameHolds) {
   EXPECT_NE(page.find("</svg>"), std::string::npos);
 }
 
+TEST(Charts, NameTicksAndLeaveOutDotsWhenAsked) {
+  const Axis x{"ms", 0, 2, false, {0, 1}, {"none", "some"}}, y{"N", 0, 2, false};
+  Series line{"one", "#123456", {{0, 0.5}, {1, 1}}, {}, true};
+  line.dots = false;
+  Svg svg(400, 300);
+  drawPoints(svg, {{50, 20}, 300, 200, "title"}, x, y, {line});
+  const std::string page = svg.str();
+  EXPECT_NE(page.find(">none<"), std::string::npos);
+  EXPECT_NE(page.find(">some<"), std::string::npos);
+  EXPECT_EQ(countOf(page, "<polyline"), 1U);
+  EXPECT_EQ(countOf(page, "<circle"), 0U);
+}
+
 TEST(Charts, PutPointsWhereTheAxesSay) {
   Svg svg(400, 300);
   const Panel panel{{50, 20}, 300, 200, "title"};
