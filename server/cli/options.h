@@ -9,6 +9,7 @@
 #include "core/plan/path.h"
 #include "core/surface/defaults.h"
 #include "server/jobs/drill_tradeoff_job.h"
+#include "server/jobs/haptic_tradeoff_job.h"
 #include "server/jobs/plan_job.h"
 
 namespace spinaltap::cli {
@@ -61,6 +62,9 @@ struct TradeoffOptions {
   std::string scene = "hand";  ///< of the drill, as what follows
   bool full = false;
   jobs::DrillTradeoffJob drill;
+  bool haptics = false;
+  jobs::HapticTradeoffJob hands;
+  std::string html;  ///< of the drill or the hands
 };
 
 struct PlanOptions {

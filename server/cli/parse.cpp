@@ -165,49 +165,82 @@ void addSurfaceTradeoff(CLI::App* sub, TradeoffOptions& o, CLI::Option* surface)
 }
 
 /// `tradeoff` alone.
-void addDrillTradeoff(CLI::App* sub, TradeoffOptions& o, CLI::Option* surface) {
+void addDrillTradeoff(CLI::App* sub, TradeoffOptions& o, CLI::Option* surface, CLI::Option* haptics) {
   sub->add_option("--scene", o.scene, "The drill that is timed")
       ->check(oneOf(session::sceneNames()))
-      ->excludes(surface)
+      ->excludes(surface, haptics)
       ->capture_default_str();
   sub->add_option("--spacing", o.drill.spacings_mm, "Of the points, mm: these, with commas")
       ->delimiter(',')
       ->check(CLI::Range(0.01, 1.0))
-      ->excludes(surface)
+      ->excludes(surface, haptics)
       ->capture_default_str();
   sub->add_option("--threads", o.drill.threads, "That share a cycle: these, with commas")
       ->delimiter(',')
       ->check(CLI::Range(1, 2))
-      ->excludes(surface)
+      ->excludes(surface, haptics)
       ->capture_default_str();
   sub->add_option("--rate", o.drill.rate_hz, "Cycles a second that are wanted")
       ->check(CLI::Range(1.0, 1e6))
-      ->excludes(surface)
+      ->excludes(surface, haptics)
       ->capture_default_str();
   sub->add_option("--headroom", o.drill.headroom, "How many times quicker a p99.9 cycle is to be")
       ->check(CLI::Range(1.0, 1000.0))
-      ->excludes(surface)
+      ->excludes(surface, haptics)
       ->capture_default_str();
   CLI::Option* length = sub->add_option("--length", o.drill.length_mm, "Of the path that is drilled, mm")
                             ->check(CLI::Range(7.0, session::kReportLength_mm))
-                            ->excludes(surface)
+                            ->excludes(surface, haptics)
                             ->capture_default_str();
-  sub->add_flag("--full", o.full, "All of the report's path, 37.8 mm")->excludes(surface)->excludes(length);
+  sub->add_flag("--full", o.full, "All of the report's path, 37.8 mm")->excludes(surface, haptics, length);
   sub->add_option("--repeats", o.drill.repeats, "Each cycle counts with its fastest of so many runs")
       ->check(CLI::Range(1, 100))
-      ->excludes(surface)
+      ->excludes(surface, haptics)
       ->capture_default_str();
-  sub->add_option("--html", o.drill.html, "Write a page with charts here")->excludes(surface);
+}
+
+/// `tradeoff --haptics`.
+void addHapticTradeoff(CLI::App* sub, TradeoffOptions& o, CLI::Option* haptics) {
+  tradeoff::HapticGrid& grid = o.hands.grid;
+  sub->add_option("--rates", grid.rates_hz, "Of the device's loop, Hz: these, with commas")
+      ->delimiter(',')
+      ->check(CLI::Range(50.0, 20'000.0))
+      ->needs(haptics)
+      ->capture_default_str();
+  sub->add_option("--delays", grid.delays_ms, "Of the network, there and back, ms: these, with commas")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 1000.0))
+      ->needs(haptics)
+      ->capture_default_str();
+  sub->add_option("--jitter", grid.jitter_ms,
+                  "Of one network more, at the middle delay: each message later by up to, ms")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->needs(haptics)
+      ->capture_default_str();
+  sub->add_option("--loss", grid.loss, "Of that network: share of the messages that is lost")
+      ->check(CLI::Range(0.0, 0.9))
+      ->needs(haptics)
+      ->capture_default_str();
+  sub->add_option("--seconds", grid.seconds, "Of drilling, each case")
+      ->check(CLI::Range(0.5, 10.0))
+      ->needs(haptics)
+      ->capture_default_str();
 }
 
 void addTradeoff(Program& program) {
   auto o = std::make_shared<TradeoffOptions>();
   CLI::App* sub = add(program, "tradeoff",
-                      "Measure what accuracy costs: of drilling, by spacing, precision and threads; or of the surface",
+                      "Measure what accuracy costs: of drilling, by spacing, precision and threads; of the surface; or "
+                      "of what a hand feels",
                       o, runTradeoff);
   CLI::Option* surface =
       sub->add_flag("--surface", o->surface, "The surface instead: methods, smoothing, tolerance, reduction");
-  addDrillTradeoff(sub, *o, surface);
+  CLI::Option* haptics =
+      sub->add_flag("--haptics", o->haptics, "What a hand feels instead: rate and delay against force and stiffness")
+          ->excludes(surface);
+  sub->add_option("--html", o->html, "Write a page with charts here")->excludes(surface);
+  addDrillTradeoff(sub, *o, surface, haptics);
+  addHapticTradeoff(sub, *o, haptics);
   addSurfaceTradeoff(sub, *o, surface);
 }
 

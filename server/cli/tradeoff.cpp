@@ -1,5 +1,6 @@
 #include "server/cli/commands.h"
 #include "server/jobs/drill_tradeoff_job.h"
+#include "server/jobs/haptic_tradeoff_job.h"
 #include "server/jobs/tradeoff_job.h"
 
 namespace spinaltap::cli {
@@ -10,10 +11,21 @@ Result<Outcome> ofDrill(const TradeoffOptions& options, ProgressBar& bar) {
   const auto scene = session::sceneNamed(options.scene);
   if (!scene) return tl::unexpected(scene.error());
   job.scene = *scene;
+  job.html = options.html;
   if (options.full) job.length_mm = session::kReportLength_mm;
   auto figures = jobs::drillTradeoff(job, bar.callback());
   if (!figures) return tl::unexpected(figures.error());
   std::string table = jobs::drillTradeoffTable(*figures);
+  if (!job.html.empty()) table += job.html + "\n";
+  return Outcome{std::move(*figures), true, std::move(table)};
+}
+
+Result<Outcome> ofHaptics(const TradeoffOptions& options, ProgressBar& bar) {
+  jobs::HapticTradeoffJob job = options.hands;
+  job.html = options.html;
+  auto figures = jobs::hapticTradeoff(job, bar.callback());
+  if (!figures) return tl::unexpected(figures.error());
+  std::string table = jobs::hapticTradeoffTable(*figures);
   if (!job.html.empty()) table += job.html + "\n";
   return Outcome{std::move(*figures), true, std::move(table)};
 }
@@ -51,6 +63,7 @@ Result<Outcome> ofSurface(const TradeoffOptions& options, ProgressBar& bar) {
 }  // namespace
 
 Result<Outcome> runTradeoff(const TradeoffOptions& options, ProgressBar& bar) {
+  if (options.haptics) return ofHaptics(options, bar);
   return options.surface ? ofSurface(options, bar) : ofDrill(options, bar);
 }
 

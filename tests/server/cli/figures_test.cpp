@@ -178,6 +178,47 @@ TEST_F(Figures, OfTheDrillsTradeoffAreRowsARecommendationAndAPage) {
   EXPECT_GT(std::filesystem::file_size(path("drill.html")), 10'000U);
 }
 
+TEST_F(Figures, OfHandsOverANetworkAreRowsCouplingsASummaryAndAPage) {
+  const Json figures = json({"tradeoff", "--haptics", "--rates", "1000,300", "--delays", "20,0", "--jitter", "0",
+                             "--loss", "0", "--seconds", "1", "--html", path("hands.html")},
+                            "tradeoff, haptics");
+  ASSERT_EQ(figures["rows"].size(), 3U * 4 * 2 * 2 * 2) << "bones, hands, rates, delays, ways";
+  ASSERT_EQ(figures["stiffest"].size(), 2U * 2 * 2 * 2) << "rates, delays, ways, guards";
+  ASSERT_EQ(figures["summary"].size(), 4U);
+  for (const Json& row : figures["rows"]) {
+    expectDocumented("tradeoff, haptics, a row", row);
+    EXPECT_EQ(row["lost"], 0);
+    EXPECT_GT(row["force_mean_N"], 0.0) << row;
+    EXPECT_NEAR(row["force_rms_percent"].get<double>() * row["force_mean_N"].get<double>(),
+                100 * row["force_rms_N"].get<double>(), 0.01 * 100 * row["force_rms_N"].get<double>());
+  }
+  for (const Json& row : figures["stiffest"]) expectDocumented("tradeoff, haptics, a coupling", row);
+  for (const Json& line : figures["summary"]) {
+    expectDocumented("tradeoff, haptics, a line of the summary", line);
+    for (const std::string way : {"answered", "extrapolated"}) {
+      double sum = 0, worst = 0;
+      for (const Json& row : figures["rows"]) {
+        const bool is_there = row["rate_hz"] == line["rate_hz"] && row["delay_ms"] == line["delay_ms"] &&
+                              row["way"] == (way == "answered" ? "as answered" : "extrapolated");
+        if (!is_there) continue;
+        sum += row["force_rms_percent"].get<double>();
+        worst = std::max(worst, row["force_rms_percent"].get<double>());
+      }
+      EXPECT_NEAR(line[way + "_percent"].get<double>(), sum / 12, 1e-3 * sum / 12);
+      EXPECT_EQ(line[way + "_worst_percent"], worst);
+    }
+    // What is late swings; what is extrapolated does not care (core/tradeoff/haptic_loop.h).
+    if (line["delay_ms"] == 20) {
+      EXPECT_LT(line["extrapolated_percent"], line["answered_percent"]);
+      EXPECT_GT(line["extrapolated_bare_N_mm"].get<double>(), 5 * line["answered_bare_N_mm"].get<double>());
+    }
+  }
+  EXPECT_EQ(figures["summary"][0]["theory_N_mm"], 6.0) << "2 b / T of 0.003 N s/mm and 1 ms";
+  EXPECT_EQ(figures["summary"][0]["delay_ms"], 0.0) << "delays in their order, rates as asked for";
+  EXPECT_EQ(figures["trace"]["t_s"].size(), 250U);
+  EXPECT_GT(std::filesystem::file_size(path("hands.html")), 50'000U);
+}
+
 TEST_F(Figures, OfARateThatNothingHoldsSayThatNoneDoes) {
   const Json figures = json({"tradeoff", "--spacing", "0.4", "--length", "7", "--repeats", "1", "--threads", "1",
                              "--scene", "on", "--rate", "1e6", "--headroom", "1000"},
