@@ -103,6 +103,7 @@ val floatsOf(const std::vector<splats::Splat>& splats) {
 
 EMSCRIPTEN_BINDINGS(spinaltap_core) {
   bindSession();
+  bindHand();
   bindPlayer();
   emscripten::function("makeScene", &makeScene);
   emscripten::function("takeError", &takeError);

@@ -44,6 +44,8 @@ class PlayerBinding {
     all.set("scene", header.scene);
     all.set("engine", header.config.engine);
     all.set("bit", bit);
+    all.set("speed_rpm", header.config.speed_rpm);
+    all.set("stiffness_N_mm", header.config.coupling ? header.config.coupling->stiffness_N_mm : 0.0);
     all.set("lattice", grid);
     all.set("points", static_cast<double>(lattice.points()));
     all.set("points_alive", static_cast<double>(countAlive(player_.before())));

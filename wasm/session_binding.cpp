@@ -80,6 +80,13 @@ Result<std::unique_ptr<SessionBinding>> fromBytes(const val& bytes_array, const 
 
 SessionBinding* make(const val& bytes, const val& config) { return orNull(fromBytes(bytes, config)); }
 
+double meanDensity(const point_volume::PointVolume& volume, const std::vector<std::uint32_t>& points) {
+  if (points.empty()) return 0;
+  double sum = 0;
+  for (const std::uint32_t point : points) sum += volume.density_mg_cm3[point];
+  return sum / static_cast<double>(points.size());
+}
+
 metrics::Plan planOf(const SessionBinding::Settings& settings, const point_volume::Lattice& lattice) {
   return {settings.header.config.bit, settings.length_mm, lattice, {}};
 }
@@ -122,7 +129,14 @@ StepResult SessionBinding::step(double t_us, double tx, double ty, double tz, do
           static_cast<double>(output.removed),
           static_cast<double>(output.removed_total),
           output.thrust_N,
-          output.depth_mm};
+          output.depth_mm,
+          output.behind,
+          output.bit.tip_mm,
+          output.bit.axis,
+          output.force_N,
+          output.torque_Nmm,
+          haptics::fromTool(output.bit.axis, output.force_N),
+          meanDensity(session_.volume(), removed_)};
 }
 
 std::string SessionBinding::stateHash() const { return hexOf(session_.stateHash()); }
@@ -168,13 +182,21 @@ val SessionBinding::recordingBytes() const {
 std::string SessionBinding::metricsJson() const { return metrics::toJson(metrics::named(metrics_.finish())); }
 
 void bindSession() {
+  emscripten::value_array<Vec3>("Vec3").element(&Vec3::x).element(&Vec3::y).element(&Vec3::z);
   emscripten::value_object<StepResult>("StepResult")
       .field("status", &StepResult::status)
       .field("cycle", &StepResult::cycle)
       .field("removed", &StepResult::removed)
       .field("removed_total", &StepResult::removed_total)
       .field("thrust_N", &StepResult::thrust_N)
-      .field("depth_mm", &StepResult::depth_mm);
+      .field("depth_mm", &StepResult::depth_mm)
+      .field("behind", &StepResult::behind)
+      .field("tip", &StepResult::tip)
+      .field("axis", &StepResult::axis)
+      .field("force_N", &StepResult::force_N)
+      .field("torque_Nmm", &StepResult::torque_Nmm)
+      .field("hand_force_N", &StepResult::hand_force_N)
+      .field("density_mg_cm3", &StepResult::density_mg_cm3);
   emscripten::function("makeSession", &make, emscripten::allow_raw_pointers());
   emscripten::class_<SessionBinding>("LiveSession")
       .function("step", &SessionBinding::step)

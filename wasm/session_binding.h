@@ -18,6 +18,11 @@ namespace spinaltap::wasm {
 struct StepResult {
   int status = 0;
   double cycle = 0, removed = 0, removed_total = 0, thrust_N = 0, depth_mm = 0;
+  bool behind = false;
+  Vec3 tip, axis;             ///< where the bit is, path frame
+  Vec3 force_N, torque_Nmm;   ///< on the hand, in the bit's own frame
+  Vec3 hand_force_N;          ///< the same force in the path frame
+  double density_mg_cm3 = 0;  ///< mean of what this step removed; 0 when it removed nothing
 };
 
 class SessionBinding {
@@ -58,6 +63,7 @@ class SessionBinding {
 };
 
 void bindSession();
+void bindHand();
 void bindPlayer();
 
 /// Bit (index & 31) of word (index >> 5), as a Uint32Array.

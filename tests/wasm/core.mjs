@@ -12,7 +12,7 @@ export async function loadCore() {
   return create({ wasmBinary: readFileSync(join(built, "spinaltap_core.wasm")) });
 }
 
-/** A solid point volume as the bytes of an 'STP1' (server/contract/haptics.md). */
+/** A point volume as the bytes of an 'STP1' (server/contract/haptics.md); `density` is a number or a function of the disc, 0: no bone. */
 export function pointVolume({ spacing = 0.1, rings = 12, discs = 30, firstDisc = -2, density = 300 } = {}) {
   const points = discs * (3 * rings * (rings - 1) + 1);
   const words = Math.ceil(points / 64);
@@ -24,8 +24,12 @@ export function pointVolume({ spacing = 0.1, rings = 12, discs = 30, firstDisc =
   view.setInt32(20, discs, true);
   view.setInt32(24, firstDisc, true);
   view.setBigUint64(28, BigInt(words), true);
-  for (let p = 0; p < points; ++p) bytes[36 + (p >> 3)] |= 1 << (p & 7);
-  for (let p = 0; p < points; ++p) view.setUint16(36 + 8 * words + 2 * p, density, true);
+  const densityOf = typeof density === "function" ? density : () => density;
+  for (let p = 0; p < points; ++p) {
+    const here = densityOf(Math.floor((p * discs) / points));
+    if (here > 0) bytes[36 + (p >> 3)] |= 1 << (p & 7);
+    view.setUint16(36 + 8 * words + 2 * p, here, true);
+  }
   return { bytes, points };
 }
 
