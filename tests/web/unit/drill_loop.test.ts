@@ -1,82 +1,7 @@
 import { decodeClientMessage } from "@web/contract/drill_messages";
-import type { CoreSession, StepOutput } from "@web/worker/core_api";
-import { DrillLoop } from "@web/worker/drill_loop";
-import { kStill } from "@web/worker/motion";
 import { type Agreement, ServerLink } from "@web/worker/server_link";
+import { standingOf } from "@web/worker/standing";
 import { describe, expect, test } from "vitest";
-
-/** Counts cycles; its hash is the count. */
-class CountingSession implements CoreSession {
-  steps: number[][] = [];
-  step(...input: [number, number, number, number, number, number, number, boolean]): StepOutput {
-    this.steps.push(input.slice(0, 7) as number[]);
-    return {
-      status: 0,
-      cycle: this.steps.length,
-      removed: 0,
-      removed_total: 0,
-      thrust_N: 0,
-      depth_mm: input[3],
-    };
-  }
-  stateHash = () => String(this.steps.length).padStart(16, "0");
-  points = () => 0;
-  aliveBits = () => new Uint32Array();
-  takeSplats = () => new Float32Array();
-  takeSplatIndices = () => new Uint32Array();
-  takeHidden = () => new Uint32Array();
-  recordingBytes = () => new Uint8Array();
-  metricsJson = () => "{}";
-  delete(): void {}
-}
-
-describe("the live loop", () => {
-  test("runs a cycle a millisecond while the bit moves, with a clock that never falls", () => {
-    const session = new CountingSession();
-    const loop = new DrillLoop(session, 0, 50);
-    loop.steer({ ...kStill, advance: 1 });
-    for (let ms = 0; ms <= 200; ms += 4.3) loop.advanceTo(ms);
-    expect(session.steps.length).toBeGreaterThanOrEqual(196);
-    expect(session.steps.length).toBeLessThanOrEqual(200);
-    session.steps.forEach(
-      (step, i) => void (i > 0 && expect(step[0]).toBeGreaterThan(session.steps[i - 1]![0]!)),
-    );
-  });
-
-  test("makes up a stall only in part", () => {
-    const session = new CountingSession();
-    const loop = new DrillLoop(session, 0, 50);
-    loop.steer({ ...kStill, advance: 1 });
-    loop.advanceTo(0);
-    expect(loop.advanceTo(10_000)).toBe(40);
-  });
-
-  test("rests while nothing moves, and time goes on", () => {
-    const session = new CountingSession();
-    const loop = new DrillLoop(session, 0, 50);
-    loop.advanceTo(0);
-    loop.advanceTo(10);
-    const first = session.steps.length;
-    for (let ms = 20; ms <= 1000; ms += 10) loop.advanceTo(ms);
-    expect(session.steps.length).toBe(first);
-    loop.steer({ ...kStill, advance: 1 });
-    loop.advanceTo(1010);
-    expect(session.steps.at(-1)![0]).toBeGreaterThan(980_000);
-  });
-
-  test("batches hold every cycle once, in order", () => {
-    const loop = new DrillLoop(new CountingSession(), 0, 50);
-    loop.steer({ ...kStill, advance: 1 });
-    loop.advanceTo(0);
-    loop.advanceTo(10);
-    const a = loop.takeBatch()!;
-    loop.advanceTo(25);
-    const b = loop.takeBatch()!;
-    expect([a.first_seq, a.poses.length, a.cycle]).toEqual([0, 10, 10]);
-    expect([b.first_seq, b.poses.length, b.cycle]).toEqual([10, 15, 25]);
-    expect(loop.takeBatch()).toBeNull();
-  });
-});
 
 function feedback(seq: number, cycle: number, hash: bigint | null): Uint8Array {
   const bytes = new Uint8Array(264);
@@ -174,5 +99,24 @@ describe("the line to the server", () => {
     other.link.lost("the line to the server closed");
     expect(other.said.at(-1)).toEqual({ kind: "offline", reason: "the line to the server closed" });
     expect(other.link.offline).toBe(true);
+  });
+});
+
+describe("what the page says of the server", () => {
+  const answers: Agreement[] = [
+    { kind: "agrees", cycle: 7, behind: 1 },
+    { kind: "differs", cycle: 7 },
+  ];
+  const others: Agreement[] = [{ kind: "connecting" }, { kind: "offline", reason: "no line" }];
+
+  test("sessions coupled alike are compared, others are not", () => {
+    for (const answer of answers) {
+      expect(standingOf(answer, true)).toEqual(answer);
+      expect(standingOf(answer, false)).toEqual({ kind: "not_compared" });
+    }
+  });
+
+  test("a line that is not there is said either way", () => {
+    for (const other of others) expect(standingOf(other, false)).toEqual(other);
   });
 });

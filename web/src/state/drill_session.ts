@@ -1,13 +1,13 @@
 // One drill as the room sees it: signals that the worker's messages move.
 import { signal } from "@preact/signals";
-import type { Vec3 } from "../contract/bodies";
 import type { PathInfo } from "../contract/rest";
-import type { Readings } from "../worker/drill_loop";
+import { kTraceFloats, type Readings } from "../worker/drill_loop";
 import type { FromWorker, SplatChange } from "../worker/messages";
-import type { Steering } from "../worker/motion";
-import type { Agreement } from "../worker/server_link";
+import { kSpeed_rpm, kStiffness_N_mm, type Steering } from "../worker/motion";
+import type { Standing } from "../worker/standing";
 import { ApiError, createSession, socketUrl } from "./api";
 import { CoreClient } from "./core_client";
+import { ForceTrace } from "./force_trace";
 import { messageOf } from "./load";
 
 export type Phase = "opening" | "drilling" | "finishing" | "finished" | "failed";
@@ -21,11 +21,13 @@ export interface Outcome {
 export class DrillSession {
   readonly phase = signal<Phase>("opening");
   readonly readings = signal<Readings | null>(null);
-  readonly agreement = signal<Agreement>({ kind: "connecting" });
+  readonly agreement = signal<Standing>({ kind: "connecting" });
   readonly trouble = signal<string | null>(null);
   readonly outcome = signal<Outcome | null>(null);
   /** Depth, thrust, depth, thrust ... ; the version counts its changes. */
   readonly trace: number[] = [];
+  /** The last seconds of push and thrust over time; changes with the same version. */
+  readonly forces = new ForceTrace();
   readonly trace_version = signal(0);
   onSplats: ((change: SplatChange) => void) | null = null;
   /** Which points are left, a few times a second while watched. */
@@ -44,11 +46,20 @@ export class DrillSession {
     } catch (error) {
       offline_reason = error instanceof ApiError ? error.message : messageOf(error);
     }
-    const config = { bit: path.bit, engine, case_id, path_id: path.id, length_mm: path.length_mm };
+    const config = {
+      bit: path.bit,
+      engine,
+      speed_rpm: kSpeed_rpm,
+      stiffness_N_mm: kStiffness_N_mm,
+      case_id,
+      path_id: path.id,
+      length_mm: path.length_mm,
+    };
     this.core.tell({
       type: "open_drill",
       point_volume,
       config_json: JSON.stringify(config),
+      stiffness_N_mm: kStiffness_N_mm,
       lead_mm: path.lead_mm,
       reach_mm: path.bit.length_mm,
       socket_url,
@@ -59,8 +70,11 @@ export class DrillSession {
   steer(steering: Steering): void {
     this.core.tell({ type: "steer", steering });
   }
-  nudge(displacement: Vec3): void {
-    this.core.tell({ type: "nudge", displacement });
+  nudge(across: [number, number]): void {
+    this.core.tell({ type: "nudge", across });
+  }
+  wheel(push_N: number): void {
+    this.core.tell({ type: "wheel", push_N });
   }
   watchAlive(on: boolean): void {
     this.core.tell({ type: "watch_alive", on });
@@ -104,8 +118,10 @@ export class DrillSession {
     requestAnimationFrame(() => this.core.tell({ type: "shown" }));
     this.readings.value = frame.readings;
     this.onSplats?.(frame.splats);
-    if (frame.trace.length === 0) return;
-    for (let i = 0; i < frame.trace.length; i += 3) this.trace.push(frame.trace[i]!, frame.trace[i + 1]!);
+    const rows = frame.trace;
+    if (rows.length === 0) return;
+    for (let i = 0; i < rows.length; i += kTraceFloats) this.trace.push(rows[i + 1]!, rows[i + 2]!);
+    this.forces.add(rows);
     ++this.trace_version.value;
   }
 }

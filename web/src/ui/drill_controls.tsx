@@ -1,8 +1,9 @@
-// The drill's controls: spin, feed, pads, the keys shown, and the end.
+// The drill's controls: spin, sound, strength, pads, the keys shown, and the end.
 import type { Signal } from "@preact/signals";
 import type { DrillSession } from "../state/drill_session";
 import type { Hand, HandEvent } from "../state/steering";
 import { Pad } from "./pads";
+import { SoundSwitch } from "./sound_switch";
 
 interface ControlsProps {
   hand: Signal<Hand>;
@@ -10,7 +11,7 @@ interface ControlsProps {
   session: DrillSession;
 }
 
-const kFeeds = [0.5, 1, 2, 5, 10];
+const kStrengths_N = [5, 10, 15, 20, 30, 40];
 
 export function DrillControls({ hand, tell, session }: ControlsProps) {
   const now = hand.value;
@@ -26,15 +27,16 @@ export function DrillControls({ hand, tell, session }: ControlsProps) {
         >
           {now.spinning ? "Bit is turning" : "Bit stands still"}
         </button>
+        <SoundSwitch session={session} />
         <label class="select">
-          <span>Feed</span>
+          <span>Keys push</span>
           <select
-            value={String(now.feed_mm_s)}
-            onChange={(event) => tell({ type: "feed", mm_s: Number(event.currentTarget.value) })}
+            value={String(now.strength_N)}
+            onChange={(event) => tell({ type: "strength", push_N: Number(event.currentTarget.value) })}
           >
-            {kFeeds.map((feed) => (
-              <option key={feed} value={String(feed)}>
-                {feed} mm/s
+            {kStrengths_N.map((strength) => (
+              <option key={strength} value={String(strength)}>
+                {strength} N
               </option>
             ))}
           </select>
@@ -49,15 +51,12 @@ export function DrillControls({ hand, tell, session }: ControlsProps) {
         />
         <Pad
           shape="tall"
-          label="In and out"
-          ends={["Out", "In"]}
-          onPush={([, up]) => tell({ type: "pad_advance", value: -up })}
+          label="Push and pull"
+          ends={["Pull", "Push"]}
+          onPush={([, up]) => tell({ type: "pad_push", value: -up })}
         />
         <KeyHelp />
       </div>
-      <p class="dim small">
-        The pointer moves the bit when dragged on it, and its wheel there goes in and out.
-      </p>
       <button
         type="button"
         class="primary finish"
@@ -66,16 +65,21 @@ export function DrillControls({ hand, tell, session }: ControlsProps) {
       >
         {phase === "opening" ? "Starting the core" : phase === "finishing" ? "Finishing" : "Finish the drill"}
       </button>
+      <p class="dim small">
+        On the bit, dragging aims and the wheel pushes; let go, and nothing pushes. A gamepad's right trigger
+        pushes, the left pulls, its sticks aim and lean.
+      </p>
     </section>
   );
 }
 
 const kHelp: [string[], string][] = [
-  [["W", "S"], "in, out"],
-  [["↑", "↓", "←", "→"], "sideways"],
+  [["W", "S"], "push, pull"],
+  [["↑", "↓", "←", "→"], "aim"],
   [["Q", "E", "R", "F"], "lean"],
   [["Shift"], "fine"],
   [["Space"], "spin"],
+  [["M"], "sound"],
 ];
 
 function KeyHelp() {

@@ -1,17 +1,18 @@
 // Keys, and the pointer on the bit itself, for the Drill room. Elsewhere in the picture the pointer turns the camera.
 import type { Signal } from "@preact/signals";
-import type { Vec3 } from "../contract/bodies";
 import type { VertebraScene } from "../scene/vertebra_scene";
 import { type Action, type Hand, type HandEvent, kKeys } from "../state/steering";
 
 interface HandLine {
   hand: Signal<Hand>;
   tell: (event: HandEvent) => void;
-  nudge: (displacement: Vec3) => void;
+  /** Moves the aim across the bit, mm. */
+  nudge: (across: [number, number]) => void;
+  wheel: (push_N: number) => void;
 }
 
 /** One wheel notch. */
-const kNotch_mm = 0.25;
+const kNotch_N = 3;
 
 /** @returns what undoes it. */
 export function attachHand(scene: VertebraScene, line: HandLine): () => void {
@@ -56,7 +57,7 @@ function attachKeys({ hand, tell }: HandLine): () => void {
 function actionOf(code: string): Action | null {
   return (kKeys as Record<string, Action>)[code] ?? null;
 }
-function isTyping(target: EventTarget | null): boolean {
+export function isTyping(target: EventTarget | null): boolean {
   return target instanceof Element && target.matches("input, select, textarea");
 }
 /** Space on a button presses the button. */
@@ -64,7 +65,7 @@ function isPressable(target: EventTarget | null): boolean {
   return target instanceof Element && target.matches("button, a, summary");
 }
 
-function attachPointer(scene: VertebraScene, { nudge }: HandLine): () => void {
+function attachPointer(scene: VertebraScene, { nudge, wheel: turn }: HandLine): () => void {
   const canvas = scene.stage.controls.domElement as HTMLCanvasElement;
   let grabbed: { id: number; x: number; y: number } | null = null;
   const down = (event: PointerEvent): void => {
@@ -81,7 +82,8 @@ function attachPointer(scene: VertebraScene, { nudge }: HandLine): () => void {
       return;
     }
     event.stopImmediatePropagation();
-    nudge(scene.dragOnBit(event.clientX - grabbed.x, event.clientY - grabbed.y));
+    const [x, y] = scene.dragOnBit(event.clientX - grabbed.x, event.clientY - grabbed.y);
+    nudge([x, y]);
     grabbed = { id: grabbed.id, x: event.clientX, y: event.clientY };
   };
   const up = (event: PointerEvent): void => {
@@ -93,7 +95,7 @@ function attachPointer(scene: VertebraScene, { nudge }: HandLine): () => void {
     if (!scene.isOnBit(event)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    nudge([0, 0, Math.sign(event.deltaY) * kNotch_mm]);
+    turn(Math.sign(event.deltaY) * kNotch_N);
   };
   const capture = { capture: true };
   canvas.addEventListener("pointerdown", down, capture);

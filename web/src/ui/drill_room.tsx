@@ -1,7 +1,7 @@
 // Drill: the hand pushes the bit, the core cuts, the server follows and the page says whether both agree.
 import { type Signal, useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
-import { type PointVolumeBody, pointVolume_mm3, type Vec3 } from "../contract/bodies";
+import type { PointVolumeBody, Vec3 } from "../contract/bodies";
 import type { PathInfo } from "../contract/rest";
 import { kBoneWindow, kPlanes } from "../geometry/slice";
 import { directionToPatient, toPatient } from "../geometry/vec";
@@ -14,11 +14,13 @@ import { keepLocally, parseMetrics } from "../state/local_recordings";
 import { addressOf, kLocalRecording } from "../state/route";
 import { type Hand, type HandEvent, handAfter, kRestingHand, steeringOf } from "../state/steering";
 import { sliceMarks } from "./case_room";
-import { Chart } from "./chart";
 import { DrillControls } from "./drill_controls";
 import { attachHand } from "./drill_input";
+import { DrillReadings, ThrustChart } from "./drill_readings";
+import { ForceChart } from "./force_chart";
+import { attachGamepad } from "./gamepad_input";
 import { MetricsTable } from "./metrics";
-import { caseCrumbs, Failure, Reading, TopBar, Waiting } from "./parts";
+import { caseCrumbs, Failure, TopBar, Waiting } from "./parts";
 import { BitLooks, Toggle } from "./scene_tools";
 import { SceneView } from "./scene_view";
 import { ServerBadge } from "./server_badge";
@@ -78,24 +80,26 @@ function Drilling({ opened }: { opened: Opened }) {
   useSignalEffect(() => {
     session.steer(steeringOf(hand.value));
   });
+  useEffect(() => attachGamepad({ hand, tell, readings: session.readings }), []);
   useSignalEffect(() => {
     const outcome = session.outcome.value;
-    if (outcome && outcome.recording_id === null) keepLocally(data.detail.id, outcome.recording);
+    if (outcome) keepLocally(data.detail.id, outcome.recording);
   });
   return (
     <div class="drill-room">
       <DrillPicture opened={opened} session={session} hand={hand} tell={tell} />
-      <aside class="panel" aria-label="Readings and controls">
+      <aside class="panel drill-panel" aria-label="Readings and controls">
         <h1 class="panel-title">{path.label || "Drill"}</h1>
         <ServerBadge agreement={session.agreement} />
         <Trouble session={session} />
-        <DrillReadings opened={opened} session={session} />
-        <ThrustChart session={session} path={path} />
+        <DrillReadings path={path} body={opened.body} session={session} />
+        <ForceChart session={session} />
         {session.phase.value === "finished" ? (
           <Finished session={session} case_id={data.detail.id} />
         ) : (
           <DrillControls hand={hand} tell={tell} session={session} />
         )}
+        <ThrustChart session={session} path={path} />
       </aside>
     </div>
   );
@@ -145,7 +149,12 @@ function DrillPicture({ opened, session, hand, tell }: PictureProps) {
     made.lookAtEntry();
     session.onSplats = (change) => made.change(change);
     session.onAlive = (alive) => made.setAlive(alive);
-    const detach = attachHand(made, { hand, tell, nudge: (by) => session.nudge(by) });
+    const detach = attachHand(made, {
+      hand,
+      tell,
+      nudge: (across) => session.nudge(across),
+      wheel: (push_N) => session.wheel(push_N),
+    });
     return () => {
       detach();
       session.onSplats = null;
@@ -232,55 +241,13 @@ function OutsideNote({ session, path }: { session: DrillSession; path: PathInfo 
   );
 }
 
-function DrillReadings({ opened, session }: { opened: Opened; session: DrillSession }) {
-  const readings = session.readings.value;
-  const volume = pointVolume_mm3(opened.body.lattice);
-  const past = (readings?.depth_mm ?? 0) - opened.path.length_mm;
-  return (
-    <div class="reading-group">
-      <dl class="readings">
-        <Reading name="Depth" value={(readings?.depth_mm ?? 0).toFixed(2)} unit="mm" hot={past > 0.5} />
-        <Reading name="Thrust" value={(readings?.thrust_N ?? 0).toFixed(2)} unit="N" />
-        <Reading name="Bone removed" value={((readings?.removed ?? 0) * volume).toFixed(1)} unit="mm³" />
-        <Reading name="Cycles" value={rateText(readings?.rate_hz ?? 0)} unit="a second" />
-      </dl>
-      <p class="reading-note">
-        {past > 0.5
-          ? `${past.toFixed(1)} mm past the target`
-          : `Target at ${opened.path.length_mm.toFixed(1)} mm · ${(readings?.cycle ?? 0).toLocaleString("en")} cycles`}
-      </p>
-    </div>
-  );
-}
-
-function rateText(hz: number): string {
-  return hz < 1 ? "idle" : Math.round(hz).toLocaleString("en");
-}
-
-function ThrustChart({ session, path }: { session: DrillSession; path: PathInfo }) {
-  const readings = session.readings.value;
-  const cursor: [number, number] | null = readings ? [readings.depth_mm, readings.thrust_N] : null;
-  const low = -Math.ceil(path.lead_mm + 6);
-  return (
-    <Chart
-      series={{ points: session.trace }}
-      version={session.trace_version.value}
-      x={{ name: "depth", unit: "mm", low, high: Math.ceil(path.length_mm + 6) }}
-      y={{ name: "thrust", unit: "N", least_high: 4 }}
-      rules={[
-        { at: 0, name: "entry", colour: "#5fe08a" },
-        { at: path.length_mm, name: "target", colour: "#f2a541" },
-      ]}
-      cursor={cursor}
-      label="Thrust over depth"
-    />
-  );
-}
-
 function Finished({ session, case_id }: { session: DrillSession; case_id: string }) {
   const outcome = session.outcome.value!;
   const metrics = parseMetrics(outcome.metrics_json);
   const id = outcome.recording_id ?? kLocalRecording;
+  const replay = (recording_id: string): string => addressOf({ room: "replay", case_id, recording_id });
+  // The server's recording holds where the bit went; only this page's holds what the hand did and felt.
+  const felt_here = outcome.recording_id !== null && session.agreement.value.kind === "not_compared";
   return (
     <section class="finished" aria-label="The finished drill">
       <h2>Finished</h2>
@@ -295,9 +262,14 @@ function Finished({ session, case_id }: { session: DrillSession; case_id: string
       )}
       {metrics && <MetricsTable metrics={metrics} />}
       <div class="row">
-        <a class="button primary" href={addressOf({ room: "replay", case_id, recording_id: id })}>
+        <a class="button primary" href={replay(id)}>
           Replay
         </a>
+        {felt_here && (
+          <a class="button" href={replay(kLocalRecording)}>
+            Replay what was felt here
+          </a>
+        )}
         <a class="button" href={addressOf({ room: "case", case_id, path_id: null })}>
           Back to the case
         </a>

@@ -228,7 +228,7 @@ function Readings({ session, opened }: { session: ReplaySession; opened: Opened 
   const pose = session.moment.value?.pose;
   const volume = pointVolume_mm3(opened.body.lattice);
   return (
-    <dl class="readings">
+    <dl class="readings" data-cycle={session.moment.value?.cycle}>
       <Reading name="Depth" value={(pose?.depth_mm ?? 0).toFixed(2)} unit="mm" />
       <Reading name="Thrust" value={(pose?.thrust_N ?? 0).toFixed(2)} unit="N" />
       <Reading name="Bone removed" value={((pose?.removed_total ?? 0) * volume).toFixed(1)} unit="mm³" />

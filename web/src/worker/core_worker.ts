@@ -1,15 +1,18 @@
 // The worker: holds the core, runs the drill's live loop or a replay, and answers the page.
-import type { CorePlayer, CoreSession, PlayerPose } from "./core_api";
+import type { CoreHand, CorePlayer, CoreSession, PlayerPose } from "./core_api";
 import { DrillLoop } from "./drill_loop";
 import { loadCore } from "./load_core";
 import type { FromWorker, OpenDrill, ToWorker } from "./messages";
+import { kGrip } from "./motion";
 import { ServerLink } from "./server_link";
+import { kServerStiffness_N_mm, standingOf } from "./standing";
 
 const kTick_ms = 4;
 const kFrame_ms = 16;
 const kAlive_ms = 100;
 
 let session: CoreSession | null = null;
+let hand: CoreHand | null = null;
 let loop: DrillLoop | null = null;
 let link: ServerLink | null = null;
 let player: CorePlayer | null = null;
@@ -31,22 +34,26 @@ function fail(error: unknown): void {
 async function openDrill(request: OpenDrill): Promise<void> {
   const core = await loadCore();
   session = new core.Session(request.point_volume, request.config_json);
-  loop = new DrillLoop(session, request.lead_mm, request.reach_mm);
+  hand = new core.Hand(kGrip.mass_kg, kGrip.damping_N_s_mm, kGrip.across_N_mm);
+  // A session that holds the bit rigidly must be led as the bit went, or it would cut where only the hand was.
+  const coupled_alike = request.stiffness_N_mm === kServerStiffness_N_mm;
+  const sends = coupled_alike ? "hand" : "bit";
+  loop = new DrillLoop(session, hand, request.lead_mm, request.reach_mm, sends);
   say({ type: "drill_open", points: session.points() });
   if (request.socket_url === null) {
     say({ type: "agreement", agreement: { kind: "offline", reason: request.offline_reason } });
   } else {
-    link = connect(request.socket_url, session.stateHash());
+    link = connect(request.socket_url, session.stateHash(), coupled_alike);
   }
   sendFrame();
   timer = self.setInterval(tick, kTick_ms);
 }
 
-function connect(url: string, start_hash: string): ServerLink {
+function connect(url: string, start_hash: string, coupled_alike: boolean): ServerLink {
   const socket = new WebSocket(url);
   socket.binaryType = "arraybuffer";
   const made = new ServerLink(socket, start_hash, {
-    agreement: (agreement) => say({ type: "agreement", agreement }),
+    agreement: (agreement) => say({ type: "agreement", agreement: standingOf(agreement, coupled_alike) }),
     finished: (recording_id, metrics_json) => endDrill(recording_id, metrics_json),
   });
   socket.onopen = () => made.opened();
@@ -124,7 +131,9 @@ function endDrill(recording_id: string | null, metrics_json: string | null): voi
   const recording = session.recordingBytes();
   const own_metrics = session.metricsJson();
   session.delete();
+  hand?.delete();
   session = null;
+  hand = null;
   loop = null;
   say({ type: "drill_finished", recording_id, metrics_json: metrics_json ?? own_metrics, recording });
 }
@@ -167,7 +176,9 @@ async function handle(message: ToWorker): Promise<void> {
     case "steer":
       return loop?.steer(message.steering);
     case "nudge":
-      return loop?.nudge(message.displacement);
+      return loop?.nudge(message.across);
+    case "wheel":
+      return loop?.wheel(message.push_N);
     case "shown":
       shown = true;
       return;

@@ -1,14 +1,35 @@
-// The live loop in the browser: as many 1 ms cycles as time has passed, poses kept for the server in batches.
+// The live loop in the browser: as many 1 ms cycles as time has passed, each of them an arm that pushes a hand, a hand
+// that pulls at the bit, and bone that pushes back. Poses are kept for the server in batches.
 import type { Vec3 } from "../contract/bodies";
 import type { Pose } from "../contract/drill_messages";
-import type { CoreSession } from "./core_api";
-import { type BitState, isMoving, kStill, nextState, owe, type Steering, startState } from "./motion";
+import { add, norm } from "../geometry/vec";
+import type { CoreHand, CoreSession, StepOutput } from "./core_api";
+import {
+  type Effort,
+  isAtWork,
+  kCycle_s,
+  kStill,
+  nextEffort,
+  owe,
+  type Steering,
+  startEffort,
+  stopForce,
+  turnWheel,
+} from "./motion";
 
 export interface Readings {
   cycle: number;
   depth_mm: number;
+  /** What the bone pushes back with along the drill. */
   thrust_N: number;
+  /** What the arm pushes with. */
+  push_N: number;
+  /** What the bone holds the bit with against its turning. */
+  torque_Nmm: number;
+  /** Of the bone cut lately; 0 while none is. */
+  density_mg_cm3: number;
   removed: number;
+  /** Of the bit. */
   tip: Vec3;
   axis: Vec3;
   spinning: boolean;
@@ -24,51 +45,61 @@ export interface Batch {
   hash: string;
 }
 
-/** A thrust this small has faded. */
-const kFaded_N = 1e-3;
+/** A row of the trace: simulated seconds, depth, thrust, push. */
+export const kTraceFloats = 4;
+const kTraceEvery = 8;
+/** A hand that was slower than this for so many cycles stands, whatever it leans on. */
+const kStanding_mm_s = 1e-2;
+const kStandsAfter = 50;
 /** After a stall of the tab, at most this much time is made up; the rest never happened. */
 const kMaxCatchUp_ms = 40;
+/** Part of the density shown that a cycle renews. */
+const kDensityRenews = 0.03;
 
 export class DrillLoop {
-  private state: BitState;
+  private effort: Effort;
   private steering: Steering = kStill;
+  private felt: StepOutput | null = null;
   private last_ms: number | null = null;
   private owed_ms = 0;
   private t_us = 0;
   private seq = 0;
-  private thrust_N = 0;
-  private cycle = 0;
-  private depth_mm = 0;
-  private removed = 0;
+  private still_cycles = kStandsAfter;
+  private density_mg_cm3 = 0;
   private poses: Pose[] = [];
   private steered = true;
   private rate = { since_ms: 0, cycles: 0, hz: 0 };
-  /** Rows of depth, thrust, removed: what the chart draws; emptied by takeTrace. */
   private trace: number[] = [];
 
+  /** @param sends whose poses the batches hold: the hand's, for a session coupled as this one; or the bit's. */
   constructor(
     private readonly session: CoreSession,
+    private readonly hand: CoreHand,
     lead_mm: number,
     private readonly reach_mm: number,
+    private readonly sends: "hand" | "bit" = "hand",
   ) {
-    this.state = startState(lead_mm);
-    this.depth_mm = this.state.tip[2];
+    this.effort = startEffort(lead_mm);
+    hand.place(this.effort.aim);
   }
 
   steer(steering: Steering): void {
     if (steering.spinning !== this.steering.spinning) this.steered = true;
     this.steering = steering;
   }
-  nudge(displacement: Vec3): void {
-    this.state = owe(this.state, displacement, this.steering.feed_mm_s);
+  /** Moves the aim across the drill, mm. */
+  nudge(across: [number, number]): void {
+    this.effort = owe(this.effort, across);
+  }
+  wheel(push_N: number): void {
+    this.effort = turnWheel(this.effort, push_N);
   }
 
   /** Runs the cycles that are due at `now_ms`; returns how many. While nothing moves none are: time passes alone. */
   advanceTo(now_ms: number): number {
     const elapsed = this.last_ms === null ? 0 : now_ms - this.last_ms;
     this.last_ms = now_ms;
-    const idle = !this.steered && !isMoving(this.state, this.steering) && this.thrust_N < kFaded_N;
-    if (idle) {
+    if (this.isIdle()) {
       this.t_us += Math.round(Math.min(elapsed, 1000) * 1000);
       this.countRate(now_ms, 0);
       return 0;
@@ -82,18 +113,30 @@ export class DrillLoop {
     return due;
   }
 
+  private isIdle(): boolean {
+    if (this.steered || isAtWork(this.effort, this.steering)) return false;
+    return this.still_cycles >= kStandsAfter;
+  }
+
   private cycleOnce(): void {
-    this.state = nextState(this.state, this.steering, this.reach_mm);
-    this.t_us += 1000;
-    const { tip, axis } = this.state;
-    const spinning = this.steering.spinning;
-    const out = this.session.step(this.t_us, tip[0], tip[1], tip[2], axis[0], axis[1], axis[2], spinning);
-    this.poses.push({ t_us: this.t_us, tip, axis, spinning });
-    this.cycle = out.cycle;
-    this.thrust_N = out.thrust_N;
-    this.depth_mm = out.depth_mm;
-    this.removed = out.removed_total;
-    if (out.cycle % 8 === 0) this.trace.push(out.depth_mm, out.thrust_N, out.removed_total);
+    const { hand, reach_mm, steering } = this;
+    const from = hand.at();
+    this.effort = nextEffort(this.effort, steering, from, reach_mm);
+    const { axis, push_N, aim } = this.effort;
+    const back = add(this.felt?.hand_force_N ?? [0, 0, 0], stopForce(from, reach_mm));
+    hand.step(kCycle_s, axis, push_N, aim, back);
+    this.still_cycles = norm(hand.velocity()) < kStanding_mm_s ? this.still_cycles + 1 : 0;
+    this.t_us += Math.round(kCycle_s * 1e6);
+    const tip = hand.at();
+    const { spinning } = steering;
+    const felt = this.session.step(this.t_us, tip[0], tip[1], tip[2], axis[0], axis[1], axis[2], spinning);
+    const sent = this.sends === "hand" ? { tip, axis } : felt;
+    this.poses.push({ t_us: this.t_us, tip: sent.tip, axis: sent.axis, spinning });
+    this.density_mg_cm3 += kDensityRenews * (felt.density_mg_cm3 - this.density_mg_cm3);
+    this.felt = felt;
+    if (felt.cycle % kTraceEvery === 0) {
+      this.trace.push(this.t_us * 1e-6, felt.depth_mm, felt.thrust_N, push_N);
+    }
   }
 
   private countRate(now_ms: number, cycles: number): void {
@@ -109,7 +152,7 @@ export class DrillLoop {
     const batch = {
       first_seq: this.seq,
       poses: this.poses,
-      cycle: this.cycle,
+      cycle: this.felt!.cycle,
       hash: this.session.stateHash(),
     };
     this.seq += this.poses.length;
@@ -117,6 +160,7 @@ export class DrillLoop {
     return batch;
   }
 
+  /** Rows of kTraceFloats since the last call. */
   takeTrace(): Float32Array {
     const rows = new Float32Array(this.trace);
     this.trace = [];
@@ -124,14 +168,18 @@ export class DrillLoop {
   }
 
   readings(): Readings {
-    const { tip, axis } = this.state;
+    const { felt, effort } = this;
+    const tip = felt?.tip ?? effort.aim;
     return {
-      cycle: this.cycle,
-      depth_mm: this.depth_mm,
-      thrust_N: this.thrust_N,
-      removed: this.removed,
+      cycle: felt?.cycle ?? 0,
+      depth_mm: felt?.depth_mm ?? tip[2],
+      thrust_N: felt?.thrust_N ?? 0,
+      push_N: effort.push_N,
+      torque_Nmm: felt ? 0 - felt.torque_Nmm[2] : 0,
+      density_mg_cm3: this.density_mg_cm3,
+      removed: felt?.removed_total ?? 0,
       tip,
-      axis,
+      axis: felt?.axis ?? effort.axis,
       spinning: this.steering.spinning,
       rate_hz: this.rate.hz,
     };

@@ -1,14 +1,15 @@
 // What the page and the core's worker say to each other.
-import type { Vec3 } from "../contract/bodies";
 import type { PlayerPose, SceneResult, Verdict } from "./core_api";
 import type { Readings } from "./drill_loop";
 import type { Steering } from "./motion";
-import type { Agreement } from "./server_link";
+import type { Standing } from "./standing";
 
 export interface OpenDrill {
   type: "open_drill";
   point_volume: Uint8Array;
   config_json: string;
+  /** Of the coupling between hand and bit, as in the config. */
+  stiffness_N_mm: number;
   lead_mm: number;
   reach_mm: number;
   /** Where the server's session listens; null to drill here alone. */
@@ -19,7 +20,9 @@ export interface OpenDrill {
 export type ToWorker =
   | OpenDrill
   | { type: "steer"; steering: Steering }
-  | { type: "nudge"; displacement: Vec3 }
+  /** Moves the aim across the drill, mm. */
+  | { type: "nudge"; across: [number, number] }
+  | { type: "wheel"; push_N: number }
   | { type: "watch_alive"; on: boolean }
   /** The last frame has been drawn: the next may come. A page that draws slowly is never flooded. */
   | { type: "shown" }
@@ -39,7 +42,7 @@ export type FromWorker =
   | { type: "drill_open"; points: number }
   | { type: "frame"; readings: Readings; splats: SplatChange; trace: Float32Array }
   | { type: "alive"; alive: Uint32Array }
-  | { type: "agreement"; agreement: Agreement }
+  | { type: "agreement"; agreement: Standing }
   | {
       type: "drill_finished";
       recording_id: string | null;
