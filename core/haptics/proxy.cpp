@@ -6,10 +6,11 @@
 namespace spinaltap::haptics {
 namespace {
 
-constexpr int kMostRounds = 100;  // of Newton; three or four are usual
-constexpr double kNudge = 1e-12, kShortestPart = 1e-13;
-constexpr double kCreep_mm_s = 0.01;  // a side's threshold is reached at this velocity
-constexpr double kSideWall = 1e9;     // a bit that stands gives way by a billionth of the pull
+constexpr int kMostRounds = 100;         // of Newton; a bound that ends it, whatever comes
+constexpr double kNudge = 1e-12;         // of the way in the open, where the search sets off
+constexpr double kShortestPart = 1e-13;  // of a step: one that runs into a wall head on is shortened to 2 / kSideWall
+constexpr double kCreep_mm_s = 0.01;     // a side's threshold is reached at this velocity
+constexpr double kSideWall = 1e9;        // a bit that stands gives way by a billionth of the pull
 
 /// Of tip and grip across the axis: tip x, tip y, grip x, grip y.
 using Across = std::array<double, 4>;

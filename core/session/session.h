@@ -37,7 +37,7 @@ struct Output {
   Status status = Status::Ok;
   std::uint64_t cycle = 0;    ///< accepted inputs so far, this one included
   std::uint64_t removed = 0;  ///< points removed by this cycle
-  bool behind = false;        ///< the motion up to here is not all cut yet; later cycles go on with it
+  bool behind = false;  ///< rigid: not all of the motion is cut yet; coupled: the hand was too fast. Goes on later
   std::uint64_t removed_total = 0;
   drill::BitPose bit;            ///< where the bit is, which need not be where the hand is
   Vec3 force_N, torque_Nmm;      ///< on the hand, in the tool's frame of `bit` (haptics::Reaction)

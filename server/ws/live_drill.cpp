@@ -117,9 +117,7 @@ Result<void> LiveDrill::accept(const wire::Poses& batch) {
 
 void LiveDrill::State::measure(const session::Input& input, const session::Output& output) {
   if (output.status != session::Status::Ok) return;
-  const bool coupled = session.config().coupling.has_value();  // then the bit is not where the hand is
-  accumulator.add({input.t_us, coupled ? output.bit.tip_mm : input.tip_mm, coupled ? output.bit.axis : input.axis,
-                   input.spinning, output.thrust_N, removed});
+  accumulator.add({input.t_us, output.bit.tip_mm, output.bit.axis, input.spinning, output.thrust_N, removed});
 }
 
 void LiveDrill::State::answer(const session::Input& input, const session::Output& output, wire::Feedback& feedback) {

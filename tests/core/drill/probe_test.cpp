@@ -122,6 +122,34 @@ TEST(Probe, MeetsBoneAllRoundRightAfterTheBitHasCutThere) {
   }
 }
 
+TEST(MeetsAlive, SaysWhatALookAtEveryPointSays) {
+  Random random(14);
+  const Lattice lattice{0.25, 14, 40, -10};
+  int met = 0, missed = 0, grazed = 0;
+  for (int n = 0; n < 4000; ++n) {
+    PointVolume volume = *point_volume::solidVolume(lattice, 500);
+    // Mostly holes: a bit that meets something meets little of it.
+    const std::uint64_t kept = random.below(3) == 0 ? 1 : 200;
+    for (auto& alive : volume.alive) alive &= random.below(kept) == 0 ? random.bits() : 0;
+    plan::Bit bit{random.uniform(0.5, 4), 0, random.uniform(4, 12)};
+    bit.cone_length_mm = random.below(3) == 0 ? 0 : random.uniform(0.1, bit.length_mm);
+    const Tool tool = randomTool(random, 180);
+    const double x = random.uniform(-5, 5), y = random.uniform(-5, 5), z = random.uniform(-6, 12);
+    const BitPose pose{{x, y, z}, tool.z};
+    const BitShape shape = shapeOf(bit);
+    std::uint64_t inside = 0;
+    for (std::uint32_t p = 0; p < lattice.points(); ++p) {
+      if (!volume.isAlive(p)) continue;
+      inside += isInside(shape, pose.tip_mm, pose.axis, point_volume::positionOf(lattice, p)) ? 1 : 0;
+    }
+    ASSERT_EQ(meetsAlive(volume, shape, pose), inside > 0) << n << ": " << inside << " points inside";
+    met += inside > 0, missed += inside == 0, grazed += inside == 1 || inside == 2;
+  }
+  EXPECT_GT(met, 500);
+  EXPECT_GT(missed, 500);
+  EXPECT_GT(grazed, 50);
+}
+
 TEST(Probe, SaysNoMoreThanIsTrueOfHowFarTheLatticeIs) {
   Random random(13);
   const Lattice lattice{0.2, 20, 50, -10};

@@ -101,6 +101,16 @@ TEST(DiscTable, KeepsNeighboursOnARingBetweenOneSpacingAndItsArc) {
   }
 }
 
+TEST(PositionOf, IsThatOfTheDiscsTable) {
+  const Lattice lattice{0.1, 12, 3, -1};
+  const DiscTable table = discTable(lattice);
+  for (std::uint32_t p = 0; p < lattice.points(); ++p) {
+    const std::uint32_t in_disc = p % lattice.pointsPerDisc();
+    const Vec3 there{table.x_mm[in_disc], table.y_mm[in_disc], lattice.discZ_mm(lattice.site(p).disc)};
+    ASSERT_EQ(positionOf(lattice, p), there);
+  }
+}
+
 TEST(PointVolume, OfOnePointTimesThePointsIsTheCylinder) {
   const Lattice lattice{0.1, 40, 100, 0};
   // Rings 0 .. n-1 stand for the annuli up to (n - 1/2) spacings; the centre is counted at 4/3 of its share.

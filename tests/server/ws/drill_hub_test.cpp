@@ -176,31 +176,6 @@ TEST_F(DrillHubTest, AForceAboveTheDevicesMaximumIsShortenedAndSaidToBe) {
   EXPECT_NEAR(norm(feedback.force_N), 1, 1e-12);
 }
 
-TEST(Device, ACouplingIsAsStiffAsAskedForByDefaultAndAsTheDeviceCanHold) {
-  wire::Hello hello;
-  EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, haptics::kStiffness_N_mm);
-  hello.max_stiffness_N_mm = 1000;
-  EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, haptics::kStiffness_N_mm);
-  hello.max_stiffness_N_mm = 2;
-  EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, 2);
-  hello.damping_N_s_mm = 0.0005, hello.device_rate_hz = 1000;
-  EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, haptics::stiffestCoupling_N_mm(0.0005, 0.001, 0));
-  hello.damping_N_s_mm = 0;
-  EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, 2) << "of a device that does not say";
-  hello.max_stiffness_N_mm = 1e-300;
-  EXPECT_GT(couplingFor(hello)->stiffness_N_mm, 0);
-  EXPECT_FALSE(couplingFor(rigidHello()).has_value());
-}
-
-TEST(Device, AForceIsScaledDownToTheDeviceAndNeverUp) {
-  wire::Hello hello;
-  EXPECT_EQ(forceScaleFor(hello), 1);
-  hello.max_force_N = haptics::kFullForce_N / 8;
-  EXPECT_EQ(forceScaleFor(hello), 0.125);
-  hello.max_force_N = 2 * haptics::kFullForce_N;
-  EXPECT_EQ(forceScaleFor(hello), 1);
-}
-
 TEST_F(DrillHubTest, RefusesMessagesOutOfOrder) {
   const auto early = connect("s1"), never = connect("s2"), twice = connect("s3"), gap = connect("s4");
   early->send(posesBytes(0, somePoses(1)));
