@@ -87,8 +87,8 @@ describe("the arm", () => {
   });
 
   test("the ends of the way push back, and nothing does between them", () => {
-    expect(stopForce([0, 0, 20], 50)).toEqual([0, 0, 0]);
-    expect(stopForce([1, 2, 51], 50)).toEqual([0, 0, -20]);
-    expect(stopForce([0, 0, -62], 50)).toEqual([0, 0, 40]);
+    expect(stopForce([0, 0, 20], 5, 50)).toEqual([0, 0, 0]);
+    expect(stopForce([1, 2, 51], 5, 50)).toEqual([0, 0, -20]);
+    expect(stopForce([0, 0, -13], 5, 50)).toEqual([0, 0, 40]);
   });
 });

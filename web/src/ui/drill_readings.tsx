@@ -2,7 +2,7 @@
 import { type PointVolumeBody, pointVolume_mm3 } from "../contract/bodies";
 import type { PathInfo } from "../contract/rest";
 import type { DrillSession } from "../state/drill_session";
-import { kMostPush_N } from "../worker/motion";
+import { kMostPush_N, kStandOff_mm } from "../worker/motion";
 import { Chart } from "./chart";
 import { Reading } from "./parts";
 
@@ -75,7 +75,7 @@ function rateText(hz: number): string {
 export function ThrustChart({ session, path }: { session: DrillSession; path: PathInfo }) {
   const readings = session.readings.value;
   const cursor: [number, number] | null = readings ? [readings.depth_mm, readings.thrust_N] : null;
-  const low = -Math.ceil(path.lead_mm + 6);
+  const low = -Math.ceil(path.lead_mm + kStandOff_mm);
   return (
     <Chart
       series={{ points: session.trace }}

@@ -10,6 +10,7 @@ import { useLoaded } from "../state/load";
 import { keptLocally } from "../state/local_recordings";
 import { ReplaySession } from "../state/replay_session";
 import { addressOf, kLocalRecording } from "../state/route";
+import { kStandOff_mm } from "../worker/motion";
 import { Chart } from "./chart";
 import { MetricsTable } from "./metrics";
 import { caseCrumbs, Failure, Reading, TopBar, Waiting } from "./parts";
@@ -250,7 +251,7 @@ function Plots({ session, path }: { session: ReplaySession; path: PathInfo }) {
         x={{
           name: "depth",
           unit: "mm",
-          low: -Math.ceil(path.lead_mm + 6),
+          low: -Math.ceil(path.lead_mm + kStandOff_mm),
           high: Math.ceil(path.length_mm + 6),
         }}
         y={{ name: "thrust", unit: "N", least_high: 4 }}

@@ -75,7 +75,7 @@ export class DrillLoop {
   constructor(
     private readonly session: CoreSession,
     private readonly hand: CoreHand,
-    lead_mm: number,
+    private readonly lead_mm: number,
     private readonly reach_mm: number,
     private readonly sends: "hand" | "bit" = "hand",
   ) {
@@ -119,11 +119,11 @@ export class DrillLoop {
   }
 
   private cycleOnce(): void {
-    const { hand, reach_mm, steering } = this;
+    const { hand, lead_mm, reach_mm, steering } = this;
     const from = hand.at();
     this.effort = nextEffort(this.effort, steering, from, reach_mm);
     const { axis, push_N, aim } = this.effort;
-    const back = add(this.felt?.hand_force_N ?? [0, 0, 0], stopForce(from, reach_mm));
+    const back = add(this.felt?.hand_force_N ?? [0, 0, 0], stopForce(from, lead_mm, reach_mm));
     hand.step(kCycle_s, axis, push_N, aim, back);
     this.still_cycles = norm(hand.velocity()) < kStanding_mm_s ? this.still_cycles + 1 : 0;
     this.t_us += Math.round(kCycle_s * 1e6);

@@ -28,8 +28,10 @@ const kTilt_rad_s = (6 * Math.PI) / 180;
 const kMaxTilt_rad = (45 * Math.PI) / 180;
 /** No cycle swings the far end of the bit farther than this. */
 const kMaxSwing_mm = 0.01;
-/** The drill may be led this far beside and before the path. */
+/** The drill may be led this far beside the path. */
 const kReach_mm = 60;
+/** A drill begins this far outside the lead; drawn back farther it would leave the picture. */
+export const kStandOff_mm = 6;
 const kStop_N_mm = 20;
 
 /** What the person asks for now. */
@@ -59,7 +61,7 @@ export interface Effort {
 }
 
 export function startEffort(lead_mm: number): Effort {
-  return { push_N: 0, wheel_N: 0, aim: [0, 0, -(lead_mm + 6)], axis: [0, 0, 1], owed: [0, 0] };
+  return { push_N: 0, wheel_N: 0, aim: [0, 0, -(lead_mm + kStandOff_mm)], axis: [0, 0, 1], owed: [0, 0] };
 }
 
 /** Adds a drag, at most two seconds' worth, so that the drill never runs on long after the pointer. */
@@ -121,9 +123,9 @@ function leashed(aim: Vec3, hand: Vec3, axis: Vec3): Vec3 {
   return held.map((v) => clamp(v, kReach_mm)) as Vec3;
 }
 
-/** What stops a hand at the ends of its way, path frame: the chuck meets the bone, or the arm is drawn back fully. */
-export function stopForce(hand: Vec3, reach_mm: number): Vec3 {
-  const past = hand[2] > reach_mm ? hand[2] - reach_mm : Math.min(0, hand[2] + kReach_mm);
+/** What stops a hand at the ends of its way, path frame: the chuck meets the bone, or the arm is back where it began. */
+export function stopForce(hand: Vec3, lead_mm: number, reach_mm: number): Vec3 {
+  const past = hand[2] > reach_mm ? hand[2] - reach_mm : Math.min(0, hand[2] + lead_mm + kStandOff_mm);
   return [0, 0, past === 0 ? 0 : -kStop_N_mm * past];
 }
 
