@@ -1,6 +1,5 @@
 import { decodeClientMessage } from "@web/contract/drill_messages";
 import { type Agreement, ServerLink } from "@web/worker/server_link";
-import { standingOf } from "@web/worker/standing";
 import { describe, expect, test } from "vitest";
 
 function feedback(seq: number, cycle: number, hash: bigint | null): Uint8Array {
@@ -13,10 +12,13 @@ function feedback(seq: number, cycle: number, hash: bigint | null): Uint8Array {
   view.setBigUint64(256, hash ?? 0n, true);
   return bytes;
 }
-function welcome(hash: bigint): Uint8Array {
+function welcome(hash: bigint, coupling = { stiffness_N_mm: 5, damping_N_s_mm: 0 }): Uint8Array {
   const bytes = new Uint8Array(63);
   bytes.set([129, 2]);
-  new DataView(bytes.buffer).setBigUint64(3, hash, true);
+  const view = new DataView(bytes.buffer);
+  view.setBigUint64(3, hash, true);
+  view.setFloat64(35, coupling.stiffness_N_mm, true);
+  view.setFloat64(43, coupling.damping_N_s_mm, true);
   return bytes;
 }
 const batch = (first_seq: number, cycle: number, hash: string) => ({
@@ -42,7 +44,7 @@ function makeLink() {
     agreement: (agreement: Agreement) => void said.push(agreement),
     finished: (id: string) => void finished.push(id),
   };
-  return { link: new ServerLink(wire, "0000000000000007", events), sent, said, finished };
+  return { link: new ServerLink(wire, "0000000000000007", 5, events), sent, said, finished };
 }
 
 describe("the line to the server", () => {
@@ -53,7 +55,14 @@ describe("the line to the server", () => {
     expect(sent.length).toBe(1);
     link.received(welcome(7n));
     expect(sent.map((bytes) => decodeClientMessage(bytes).type)).toEqual(["hello", "poses"]);
-    expect(decodeClientMessage(sent[0]!)).toMatchObject({ role: "drive", rigid: true, token: null });
+    expect(decodeClientMessage(sent[0]!)).toMatchObject({
+      role: "drive",
+      rigid: false,
+      max_stiffness_N_mm: 5,
+      damping_N_s_mm: 0,
+      device_rate_hz: 0,
+      token: null,
+    });
   });
 
   test("agrees when the hashes of the same cycle are equal", () => {
@@ -62,18 +71,45 @@ describe("the line to the server", () => {
     link.send(batch(0, 1, "00000000000000aa"));
     link.send(batch(1, 2, "00000000000000bb"));
     link.received(feedback(0, 1, 0xaan));
-    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 1, behind: 1 });
+    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 1 });
   });
 
-  test("an answer to several batches at once, without a hash, agrees by its cycles", () => {
+  test("an answer to several batches at once without a hash says nothing of hashes", () => {
     const { link, said } = makeLink();
     link.received(welcome(7n));
     link.send(batch(0, 1, "00000000000000aa"));
     link.send(batch(1, 2, "00000000000000bb"));
+    link.send(batch(2, 3, "00000000000000cc"));
     link.received(feedback(1, 2, null));
-    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 2, behind: 0 });
+    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 0 });
+    link.received(feedback(2, 3, 0xccn));
+    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 3 });
     link.received(Uint8Array.from([133, 2, 4, 0, 0, 0, 0]));
-    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 2, behind: 0 });
+    expect(said.at(-1)).toEqual({ kind: "agrees", cycle: 3 });
+  });
+
+  test("a count of cycles that differs needs no hash", () => {
+    const { link, said } = makeLink();
+    link.received(welcome(7n));
+    link.send(batch(0, 1, "00000000000000aa"));
+    link.received(feedback(0, 3, null));
+    expect(said.at(-1)).toEqual({ kind: "differs", cycle: 1 });
+  });
+
+  test("a server that couples hand and bit otherwise is not compared, and keeps the drill all the same", () => {
+    for (const other of [
+      { stiffness_N_mm: 0, damping_N_s_mm: 0 },
+      { stiffness_N_mm: 2, damping_N_s_mm: 0 },
+      { stiffness_N_mm: 5, damping_N_s_mm: 0.001 },
+    ]) {
+      const { link, said, sent } = makeLink();
+      link.opened();
+      link.received(welcome(7n, other));
+      link.send(batch(0, 1, "00000000000000aa"));
+      link.received(feedback(0, 1, 0xabn));
+      expect(said).toEqual([{ kind: "not_compared" }]);
+      expect(sent.length).toBe(2);
+    }
   });
 
   test("a differing hash, start state or cycle count is said once and stays said", () => {
@@ -99,24 +135,5 @@ describe("the line to the server", () => {
     other.link.lost("the line to the server closed");
     expect(other.said.at(-1)).toEqual({ kind: "offline", reason: "the line to the server closed" });
     expect(other.link.offline).toBe(true);
-  });
-});
-
-describe("what the page says of the server", () => {
-  const answers: Agreement[] = [
-    { kind: "agrees", cycle: 7, behind: 1 },
-    { kind: "differs", cycle: 7 },
-  ];
-  const others: Agreement[] = [{ kind: "connecting" }, { kind: "offline", reason: "no line" }];
-
-  test("sessions coupled alike are compared, others are not", () => {
-    for (const answer of answers) {
-      expect(standingOf(answer, true)).toEqual(answer);
-      expect(standingOf(answer, false)).toEqual({ kind: "not_compared" });
-    }
-  });
-
-  test("a line that is not there is said either way", () => {
-    for (const other of others) expect(standingOf(other, false)).toEqual(other);
   });
 });

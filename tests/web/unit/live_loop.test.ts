@@ -5,10 +5,10 @@ import { FakeHand, FakeSession } from "./fake_core";
 
 const pushing = (push_N: number): Steering => ({ ...kStill, push_N });
 
-function makeLoop(hard?: (z: number) => number, sends?: "hand" | "bit") {
+function makeLoop(hard?: (z: number) => number) {
   const session = new FakeSession(hard);
   const hand = new FakeHand();
-  return { session, hand, loop: new DrillLoop(session, hand, 0, 50, sends) };
+  return { session, hand, loop: new DrillLoop(session, hand, 0, 50) };
 }
 
 /** Runs until `ms`, from the last call on. */
@@ -92,18 +92,15 @@ describe("the live loop", () => {
     expect(loop.readings().depth_mm, "15 N against a stop of 20 N/mm").toBeCloseTo(50.75, 1);
   });
 
-  test("draws the bit, not the hand; a server that has no hand is led as the bit went", () => {
-    const wall = (z: number): number => (z >= 0 ? 1e9 : 0);
-    const to_hand = makeLoop(wall, "hand");
-    const to_bit = makeLoop(wall, "bit");
-    for (const { loop } of [to_hand, to_bit]) {
-      loop.steer(pushing(20));
-      run(loop, 0, 2000);
-      expect(loop.readings().tip[2]).toBe(loop.readings().depth_mm);
-    }
-    const [of_hand, of_bit] = [to_hand, to_bit].map((made) => made.loop.takeBatch()!.poses.at(-1)!.tip[2]);
-    expect(of_hand).toBeCloseTo(to_hand.hand.at()[2], 9);
-    expect(of_hand! - of_bit!, "20 N over 5 N/mm").toBeCloseTo(4, 2);
+  test("draws the bit, and sends the server the hand that pulls at it", () => {
+    const { loop, hand } = makeLoop((z) => (z >= 0 ? 1e9 : 0));
+    loop.steer(pushing(20));
+    run(loop, 0, 2000);
+    const bit_mm = loop.readings().tip[2];
+    expect(bit_mm).toBe(loop.readings().depth_mm);
+    const sent_mm = loop.takeBatch()!.poses.at(-1)!.tip[2];
+    expect(sent_mm).toBe(hand.at()[2]);
+    expect(sent_mm - bit_mm, "20 N over 5 N/mm").toBeCloseTo(4, 2);
   });
 
   test("the trace holds time, depth, force and push, in order", () => {

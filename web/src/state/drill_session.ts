@@ -3,8 +3,8 @@ import { signal } from "@preact/signals";
 import type { PathInfo } from "../contract/rest";
 import { kTraceFloats, type Readings } from "../worker/drill_loop";
 import type { FromWorker, SplatChange } from "../worker/messages";
-import { kSpeed_rpm, kStiffness_N_mm, type Steering } from "../worker/motion";
-import type { Standing } from "../worker/standing";
+import { kStiffness_N_mm, type Steering } from "../worker/motion";
+import type { Agreement } from "../worker/server_link";
 import { ApiError, createSession, socketUrl } from "./api";
 import { CoreClient } from "./core_client";
 import { ForceTrace } from "./force_trace";
@@ -15,13 +15,14 @@ export type Phase = "opening" | "drilling" | "finishing" | "finished" | "failed"
 export interface Outcome {
   recording_id: string | null;
   metrics_json: string | null;
-  recording: Uint8Array;
+  /** Where the server has not kept one. */
+  recording: Uint8Array | null;
 }
 
 export class DrillSession {
   readonly phase = signal<Phase>("opening");
   readonly readings = signal<Readings | null>(null);
-  readonly agreement = signal<Standing>({ kind: "connecting" });
+  readonly agreement = signal<Agreement>({ kind: "connecting" });
   readonly trouble = signal<string | null>(null);
   readonly outcome = signal<Outcome | null>(null);
   /** Depth, thrust, depth, thrust ... ; the version counts its changes. */
@@ -46,10 +47,10 @@ export class DrillSession {
     } catch (error) {
       offline_reason = error instanceof ApiError ? error.message : messageOf(error);
     }
+    // The speed is the core's own default, here as in the server's session.
     const config = {
       bit: path.bit,
       engine,
-      speed_rpm: kSpeed_rpm,
       stiffness_N_mm: kStiffness_N_mm,
       case_id,
       path_id: path.id,

@@ -1,4 +1,4 @@
-// Drill: the hand pushes the bit, the core cuts, the server follows and the page says whether both agree.
+// Drill: the hand pushes the bit, the core cuts, the server does the same and the page says whether both agree.
 import { type Signal, useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import type { PointVolumeBody, Vec3 } from "../contract/bodies";
@@ -82,8 +82,8 @@ function Drilling({ opened }: { opened: Opened }) {
   });
   useEffect(() => attachGamepad({ hand, tell, readings: session.readings }), []);
   useSignalEffect(() => {
-    const outcome = session.outcome.value;
-    if (outcome) keepLocally(data.detail.id, outcome.recording);
+    const recording = session.outcome.value?.recording;
+    if (recording) keepLocally(data.detail.id, recording);
   });
   return (
     <div class="drill-room">
@@ -244,10 +244,7 @@ function OutsideNote({ session, path }: { session: DrillSession; path: PathInfo 
 function Finished({ session, case_id }: { session: DrillSession; case_id: string }) {
   const outcome = session.outcome.value!;
   const metrics = parseMetrics(outcome.metrics_json);
-  const id = outcome.recording_id ?? kLocalRecording;
-  const replay = (recording_id: string): string => addressOf({ room: "replay", case_id, recording_id });
-  // The server's recording holds where the bit went; only this page's holds what the hand did and felt.
-  const felt_here = outcome.recording_id !== null && session.agreement.value.kind === "not_compared";
+  const recording_id = outcome.recording_id ?? kLocalRecording;
   return (
     <section class="finished" aria-label="The finished drill">
       <h2>Finished</h2>
@@ -262,14 +259,9 @@ function Finished({ session, case_id }: { session: DrillSession; case_id: string
       )}
       {metrics && <MetricsTable metrics={metrics} />}
       <div class="row">
-        <a class="button primary" href={replay(id)}>
+        <a class="button primary" href={addressOf({ room: "replay", case_id, recording_id })}>
           Replay
         </a>
-        {felt_here && (
-          <a class="button" href={replay(kLocalRecording)}>
-            Replay what was felt here
-          </a>
-        )}
         <a class="button" href={addressOf({ room: "case", case_id, path_id: null })}>
           Back to the case
         </a>

@@ -1,8 +1,8 @@
 // Whether the server's session and the one in this page have the same state.
 import type { Signal } from "@preact/signals";
-import type { Standing } from "../worker/standing";
+import type { Agreement } from "../worker/server_link";
 
-export function ServerBadge({ agreement }: { agreement: Signal<Standing> }) {
+export function ServerBadge({ agreement }: { agreement: Signal<Agreement> }) {
   const now = agreement.value;
   return (
     <p class={`badge badge-${now.kind}`} data-agreement={now.kind} role="status">
@@ -12,7 +12,7 @@ export function ServerBadge({ agreement }: { agreement: Signal<Standing> }) {
   );
 }
 
-export function agreementText(now: Standing): string {
+export function agreementText(now: Agreement): string {
   switch (now.kind) {
     case "connecting":
       return "Reaching the server";
@@ -23,7 +23,7 @@ export function agreementText(now: Standing): string {
     case "differs":
       return `Server differs at cycle ${now.cycle.toLocaleString("en")}; its result counts`;
     case "not_compared":
-      return "Server follows the bit; not compared";
+      return "Server holds the bit otherwise; not compared";
     case "offline":
       return `Offline, local only: ${now.reason}`;
   }

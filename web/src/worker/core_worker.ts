@@ -5,7 +5,6 @@ import { loadCore } from "./load_core";
 import type { FromWorker, OpenDrill, ToWorker } from "./messages";
 import { kGrip } from "./motion";
 import { ServerLink } from "./server_link";
-import { kServerStiffness_N_mm, standingOf } from "./standing";
 
 const kTick_ms = 4;
 const kFrame_ms = 16;
@@ -35,25 +34,22 @@ async function openDrill(request: OpenDrill): Promise<void> {
   const core = await loadCore();
   session = new core.Session(request.point_volume, request.config_json);
   hand = new core.Hand(kGrip.mass_kg, kGrip.damping_N_s_mm, kGrip.across_N_mm);
-  // A session that holds the bit rigidly must be led as the bit went, or it would cut where only the hand was.
-  const coupled_alike = request.stiffness_N_mm === kServerStiffness_N_mm;
-  const sends = coupled_alike ? "hand" : "bit";
-  loop = new DrillLoop(session, hand, request.lead_mm, request.reach_mm, sends);
+  loop = new DrillLoop(session, hand, request.lead_mm, request.reach_mm);
   say({ type: "drill_open", points: session.points() });
   if (request.socket_url === null) {
     say({ type: "agreement", agreement: { kind: "offline", reason: request.offline_reason } });
   } else {
-    link = connect(request.socket_url, session.stateHash(), coupled_alike);
+    link = connect(request.socket_url, session.stateHash(), request.stiffness_N_mm);
   }
   sendFrame();
   timer = self.setInterval(tick, kTick_ms);
 }
 
-function connect(url: string, start_hash: string, coupled_alike: boolean): ServerLink {
+function connect(url: string, start_hash: string, stiffness_N_mm: number): ServerLink {
   const socket = new WebSocket(url);
   socket.binaryType = "arraybuffer";
-  const made = new ServerLink(socket, start_hash, {
-    agreement: (agreement) => say({ type: "agreement", agreement: standingOf(agreement, coupled_alike) }),
+  const made = new ServerLink(socket, start_hash, stiffness_N_mm, {
+    agreement: (agreement) => say({ type: "agreement", agreement }),
     finished: (recording_id, metrics_json) => endDrill(recording_id, metrics_json),
   });
   socket.onopen = () => made.opened();
@@ -128,7 +124,7 @@ function finishDrill(): void {
 
 function endDrill(recording_id: string | null, metrics_json: string | null): void {
   if (!session) return;
-  const recording = session.recordingBytes();
+  const recording = recording_id === null ? session.recordingBytes() : null;
   const own_metrics = session.metricsJson();
   session.delete();
   hand?.delete();

@@ -1,5 +1,5 @@
 // The live loop in the browser: as many 1 ms cycles as time has passed, each of them an arm that pushes a hand, a hand
-// that pulls at the bit, and bone that pushes back. Poses are kept for the server in batches.
+// that pulls at the bit, and bone that pushes back. The hand's poses are kept for the server in batches.
 import type { Vec3 } from "../contract/bodies";
 import type { Pose } from "../contract/drill_messages";
 import { add, norm } from "../geometry/vec";
@@ -71,13 +71,11 @@ export class DrillLoop {
   private rate = { since_ms: 0, cycles: 0, hz: 0 };
   private trace: number[] = [];
 
-  /** @param sends whose poses the batches hold: the hand's, for a session coupled as this one; or the bit's. */
   constructor(
     private readonly session: CoreSession,
     private readonly hand: CoreHand,
     private readonly lead_mm: number,
     private readonly reach_mm: number,
-    private readonly sends: "hand" | "bit" = "hand",
   ) {
     this.effort = startEffort(lead_mm);
     hand.place(this.effort.aim);
@@ -130,8 +128,7 @@ export class DrillLoop {
     const tip = hand.at();
     const { spinning } = steering;
     const felt = this.session.step(this.t_us, tip[0], tip[1], tip[2], axis[0], axis[1], axis[2], spinning);
-    const sent = this.sends === "hand" ? { tip, axis } : felt;
-    this.poses.push({ t_us: this.t_us, tip: sent.tip, axis: sent.axis, spinning });
+    this.poses.push({ t_us: this.t_us, tip, axis, spinning });
     this.density_mg_cm3 += kDensityRenews * (felt.density_mg_cm3 - this.density_mg_cm3);
     this.felt = felt;
     if (felt.cycle % kTraceEvery === 0) {

@@ -2,7 +2,7 @@
 import type { PlayerPose, SceneResult, Verdict } from "./core_api";
 import type { Readings } from "./drill_loop";
 import type { Steering } from "./motion";
-import type { Standing } from "./standing";
+import type { Agreement } from "./server_link";
 
 export interface OpenDrill {
   type: "open_drill";
@@ -42,12 +42,13 @@ export type FromWorker =
   | { type: "drill_open"; points: number }
   | { type: "frame"; readings: Readings; splats: SplatChange; trace: Float32Array }
   | { type: "alive"; alive: Uint32Array }
-  | { type: "agreement"; agreement: Standing }
+  | { type: "agreement"; agreement: Agreement }
   | {
       type: "drill_finished";
       recording_id: string | null;
       metrics_json: string | null;
-      recording: Uint8Array;
+      /** Where the server has not kept one. */
+      recording: Uint8Array | null;
     }
   | { type: "replay_open"; cycles: number; header_json: string; series: Float32Array; stride: number }
   | { type: "moment"; cycle: number; pose: PlayerPose; splats: Float32Array; alive: Uint32Array }

@@ -8,8 +8,9 @@ export const kCycle_s = 0.001;
 export const kMostPush_N = 40;
 /** Pulling back is done with the fingers. */
 export const kMostPull_N = 6;
-/** Between hand and bit: under 10 N the hand is 2 mm ahead. */
+/** Between hand and bit: under 10 N the hand is 2 mm ahead. The server's default too, so that it can agree. */
 export const kStiffness_N_mm = 5;
+/** Of a bit that turns: the core's default. */
 export const kSpeed_rpm = 1000;
 /**
  * The hand on the drill. Along it there is no spring: it goes on as long as it pushes. A hand that has pushed 15 N and

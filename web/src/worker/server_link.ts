@@ -1,11 +1,15 @@
-// The line to the server's session: sends batches, compares the server's state hash with ours at the same cycle.
+// The line to the server's session: sends batches of the hand's poses, compares the server's state hash with ours at the
+// same cycle.
 import { decodeServerMessage, encodeClientMessage, type Hello } from "../contract/drill_messages";
 import type { Batch } from "./drill_loop";
 
 export type Agreement =
   | { kind: "connecting" }
-  | { kind: "agrees"; cycle: number; behind: number }
+  /** As of the last cycle whose hash the server has sent. */
+  | { kind: "agrees"; cycle: number }
   | { kind: "differs"; cycle: number }
+  /** The server couples hand and bit otherwise than this page: the two are bound to differ. */
+  | { kind: "not_compared" }
   | { kind: "offline"; reason: string };
 
 export interface LinkEvents {
@@ -21,27 +25,28 @@ export interface Wire {
 
 export class ServerLink {
   private expected = new Map<number, { cycle: number; hash: string }>();
-  private sent_cycle = 0;
   private state: Agreement = { kind: "connecting" };
   private waiting: Uint8Array<ArrayBuffer>[] = [];
   private welcomed = false;
   private over = false;
 
+  /** @param stiffness_N_mm of this page's own coupling between hand and bit, which has no damping. */
   constructor(
     private readonly wire: Wire,
     private readonly start_hash: string,
+    private readonly stiffness_N_mm: number,
     private readonly events: LinkEvents,
   ) {}
 
   opened(): void {
-    // Rigid: this page computes the same drill itself, and shows what the server says of it.
+    // No device: of its damping and rate nothing is said, so that no device lowers the stiffness.
     const hello: Hello = {
       type: "hello",
       role: "drive",
-      rigid: true,
+      rigid: false,
       max_rate_hz: 0,
       max_force_N: 0,
-      max_stiffness_N_mm: 0,
+      max_stiffness_N_mm: this.stiffness_N_mm,
       damping_N_s_mm: 0,
       device_rate_hz: 0,
       token: null,
@@ -52,7 +57,6 @@ export class ServerLink {
   send(batch: Batch): void {
     if (this.state.kind === "offline" || this.over) return;
     this.expected.set(batch.first_seq + batch.poses.length - 1, { cycle: batch.cycle, hash: batch.hash });
-    this.sent_cycle = batch.cycle;
     this.post(encodeClientMessage({ type: "poses", first_seq: batch.first_seq, poses: batch.poses }));
   }
 
@@ -88,6 +92,8 @@ export class ServerLink {
     switch (message.type) {
       case "welcome":
         this.welcomed = true;
+        if (message.stiffness_N_mm !== this.stiffness_N_mm || message.damping_N_s_mm !== 0)
+          this.say({ kind: "not_compared" });
         this.compare(message.state_hash, { cycle: 0, hash: this.start_hash });
         for (const held of this.waiting) this.wire.send(held);
         this.waiting = [];
@@ -96,8 +102,7 @@ export class ServerLink {
         const ours = this.expected.get(message.seq);
         if (!ours) break;
         for (const seq of this.expected.keys()) if (seq <= message.seq) this.expected.delete(seq);
-        if (message.cycle === ours.cycle) this.compare(message.state_hash, ours);
-        else this.say({ kind: "differs", cycle: Math.min(message.cycle, ours.cycle) });
+        this.compare(message.state_hash, ours, message.cycle);
         break;
       }
       case "finished":
@@ -112,13 +117,12 @@ export class ServerLink {
     }
   }
 
-  /** A feedback without a hash agrees by its count of cycles; the hash comes every few. */
-  private compare(theirs: string | null, ours: { cycle: number; hash: string }): void {
+  private compare(theirs: string | null, ours: { cycle: number; hash: string }, cycle = ours.cycle): void {
     // Once they differ they cannot agree again: keep the first cycle at which it was seen.
-    if (this.state.kind === "differs") return;
-    if (theirs === null || theirs === ours.hash)
-      this.say({ kind: "agrees", cycle: ours.cycle, behind: this.sent_cycle - ours.cycle });
-    else this.say({ kind: "differs", cycle: ours.cycle });
+    if (this.state.kind === "differs" || this.state.kind === "not_compared") return;
+    if (cycle !== ours.cycle) this.say({ kind: "differs", cycle: Math.min(cycle, ours.cycle) });
+    else if (theirs !== null)
+      this.say({ kind: theirs === ours.hash ? "agrees" : "differs", cycle: ours.cycle });
   }
 
   private drop(reason: string): void {
