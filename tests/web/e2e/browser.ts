@@ -45,6 +45,25 @@ export async function openPage(
   return { page, errors };
 }
 
+export async function readingOf(page: Page, name: string): Promise<number> {
+  return Number((await page.locator(`[data-reading="${name}"]`).textContent())!.replaceAll(",", ""));
+}
+
+/** Waits until `probe` is true, asking a few times a second. */
+export async function until(what: string, probe: () => Promise<boolean>): Promise<void> {
+  for (const end = Date.now() + kSlow_ms; Date.now() < end; ) {
+    if (await probe()) return;
+    await new Promise((done) => setTimeout(done, 200));
+  }
+  throw new Error(`waited in vain until ${what}`);
+}
+
+/** The last cycle at which the server's hash was the page's own; 0 while nothing was compared. */
+export async function agreedCycle(page: Page): Promise<number> {
+  const text = (await page.locator("[data-agreement]").textContent())!;
+  return Number(text.match(/agrees at cycle ([\d,]+)/)?.[1]?.replaceAll(",", "") ?? 0);
+}
+
 export async function keepPicture(page: Page, name: string): Promise<void> {
   mkdirSync(screenshots, { recursive: true });
   await page.screenshot({ path: resolve(screenshots, `${name}.png`), timeout: kSlow_ms });

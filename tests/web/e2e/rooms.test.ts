@@ -5,7 +5,7 @@ import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
-import { keepPicture, kSlow_ms, launch, lookAt, openPage } from "./browser";
+import { agreedCycle, keepPicture, kSlow_ms, launch, lookAt, openPage, readingOf, until } from "./browser";
 import { type Served, serve, serveNothing, top } from "./served";
 
 let served: Served;
@@ -51,17 +51,7 @@ async function expectAccessible(): Promise<void> {
   ).toEqual([]);
 }
 
-const reading = async (name: string): Promise<number> =>
-  Number((await page.locator(`[data-reading="${name}"]`).textContent())!.replaceAll(",", ""));
-
-/** Waits until `probe` is true, asking a few times a second. */
-async function until(what: string, probe: () => Promise<boolean>): Promise<void> {
-  for (const end = Date.now() + kSlow_ms; Date.now() < end; ) {
-    if (await probe()) return;
-    await page.waitForTimeout(200);
-  }
-  throw new Error(`waited in vain until ${what}`);
-}
+const reading = (name: string): Promise<number> => readingOf(page, name);
 
 async function firstCase(): Promise<void> {
   await page.goto(`${served.address}/#/`);
@@ -215,11 +205,7 @@ function slowness(places: [number, number][], from_mm: number, to_mm: number): n
   return (last[0] - first[0]) / (last[1] - first[1]);
 }
 
-/** The last cycle at which the server's hash was the page's own. */
-async function agreedCycle(): Promise<number> {
-  const text = (await page.locator('[data-agreement="agrees"]').textContent())!;
-  return Number(text.match(/at cycle ([\d,]+)/)?.[1]?.replaceAll(",", "") ?? 0);
-}
+/** Of the drill that is finished, as the page saw it. */
 let agreed = 0;
 
 describe("a drill", () => {
@@ -357,7 +343,7 @@ describe("a drill", () => {
     expect(await page.locator('[data-metric="peak_thrust_N"] .number').textContent()).toMatch(/^\d/);
     expect(await page.locator(".finished code").textContent()).toMatch(/^\w+$/);
     // Every hash that the server sent, to the last, was this page's own.
-    agreed = await agreedCycle();
+    agreed = await agreedCycle(page);
     expect(agreed).toBeGreaterThan(1000);
     await expectAccessible();
     await keepPicture(page, "finished");

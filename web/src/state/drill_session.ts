@@ -85,6 +85,10 @@ export class DrillSession {
     this.phase.value = "finishing";
     this.core.tell({ type: "finish_drill" });
   }
+  /** The server, being out of reach, need not keep it. */
+  finishAlone(): void {
+    this.core.tell({ type: "finish_alone" });
+  }
   close(): void {
     this.core.close();
   }

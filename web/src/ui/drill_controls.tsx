@@ -65,6 +65,11 @@ export function DrillControls({ hand, tell, session }: ControlsProps) {
       >
         {phase === "opening" ? "Starting the core" : phase === "finishing" ? "Finishing" : "Finish the drill"}
       </button>
+      {phase === "finishing" && session.agreement.value.kind === "reconnecting" && (
+        <button type="button" class="finish" onClick={() => session.finishAlone()}>
+          Finish without the server
+        </button>
+      )}
       <p class="dim small">
         On the bit, dragging aims and the wheel pushes; let go, and nothing pushes. A gamepad's right trigger
         pushes, the left pulls, its sticks aim and lean.

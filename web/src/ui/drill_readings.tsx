@@ -30,9 +30,8 @@ export function DrillReadings({ path, body, session }: ReadingsProps) {
         <Gauge name="Felt" newtons={thrust_N} kind="felt" />
       </div>
       <p class="reading-note">
-        {past > 0.5
-          ? `${past.toFixed(1)} mm past the target`
-          : `Target at ${path.length_mm.toFixed(1)} mm · ${(readings?.cycle ?? 0).toLocaleString("en")} cycles`}
+        {past > 0.5 ? `${past.toFixed(1)} mm past the target` : `Target at ${path.length_mm.toFixed(1)} mm`}
+        {` · ${(readings?.cycle ?? 0).toLocaleString("en")} cycles`}
       </p>
     </div>
   );

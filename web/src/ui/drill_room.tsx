@@ -250,7 +250,7 @@ function Finished({ session, case_id }: { session: DrillSession; case_id: string
       <h2>Finished</h2>
       {outcome.recording_id === null ? (
         <p class="dim">
-          The server has not kept this drill. It can be replayed here until the page is closed.
+          The server has not said that it kept this drill. It can be replayed here until the page is closed.
         </p>
       ) : (
         <p class="dim">

@@ -24,6 +24,8 @@ export function agreementText(now: Agreement): string {
       return `Server differs at cycle ${now.cycle.toLocaleString("en")}; its result counts`;
     case "not_compared":
       return "Server holds the bit otherwise; not compared";
+    case "reconnecting":
+      return "Reconnecting to the server";
     case "offline":
       return `Offline, local only: ${now.reason}`;
   }

@@ -4,7 +4,7 @@ import { DrillLoop } from "./drill_loop";
 import { loadCore } from "./load_core";
 import type { FromWorker, OpenDrill, ToWorker } from "./messages";
 import { kGrip } from "./motion";
-import { ServerLink } from "./server_link";
+import { type Dial, ServerLink } from "./server_link";
 
 const kTick_ms = 4;
 const kFrame_ms = 16;
@@ -46,18 +46,22 @@ async function openDrill(request: OpenDrill): Promise<void> {
 }
 
 function connect(url: string, start_hash: string, stiffness_N_mm: number): ServerLink {
-  const socket = new WebSocket(url);
-  socket.binaryType = "arraybuffer";
-  const made = new ServerLink(socket, start_hash, stiffness_N_mm, {
-    agreement: (agreement) => say({ type: "agreement", agreement }),
+  const dial: Dial = ({ opened, received, ended }) => {
+    const socket = new WebSocket(url);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = opened;
+    socket.onmessage = (event) => received(new Uint8Array(event.data as ArrayBuffer));
+    socket.onclose = (event) => ended(event.reason || "the line to the server closed");
+    return socket;
+  };
+  const made = new ServerLink(dial, start_hash, stiffness_N_mm, {
+    agreement(agreement) {
+      say({ type: "agreement", agreement });
+      if (agreement.kind === "offline" && finishing) endDrill(null, null);
+    },
     finished: (recording_id, metrics_json) => endDrill(recording_id, metrics_json),
   });
-  socket.onopen = () => made.opened();
-  socket.onmessage = (event) => made.received(new Uint8Array(event.data as ArrayBuffer));
-  socket.onclose = (event) => {
-    made.lost(event.reason || "the line to the server closed");
-    if (finishing) endDrill(null, null);
-  };
+  made.connect();
   return made;
 }
 
@@ -114,10 +118,10 @@ let finishing = false;
 
 function finishDrill(): void {
   if (!loop || finishing) return;
-  finishing = true;
   self.clearInterval(timer);
   sendBatch();
   sendFrame();
+  finishing = true;
   if (link && !link.offline) link.finish();
   else endDrill(null, null);
 }
@@ -184,6 +188,8 @@ async function handle(message: ToWorker): Promise<void> {
       return;
     case "finish_drill":
       return finishDrill();
+    case "finish_alone":
+      return link?.giveUp("it was not waited for");
     case "open_replay":
       return openReplay(message.recording, message.verify_only);
     case "seek":

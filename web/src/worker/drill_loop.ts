@@ -152,7 +152,7 @@ export class DrillLoop {
       cycle: this.felt!.cycle,
       hash: this.session.stateHash(),
     };
-    this.seq += this.poses.length;
+    this.seq = (this.seq + this.poses.length) >>> 0;
     this.poses = [];
     return batch;
   }

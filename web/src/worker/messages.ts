@@ -27,6 +27,8 @@ export type ToWorker =
   /** The last frame has been drawn: the next may come. A page that draws slowly is never flooded. */
   | { type: "shown" }
   | { type: "finish_drill" }
+  /** After it: waits no longer for the server. */
+  | { type: "finish_alone" }
   | { type: "open_replay"; recording: Uint8Array; verify_only: boolean }
   | { type: "seek"; cycle: number }
   | { type: "run_scene"; name: string; engine: string; cycles: number; discs: number };
