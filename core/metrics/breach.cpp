@@ -81,7 +81,33 @@ void findSide(const Field& field, std::span<const Sample> samples, int medial_pa
   }
 }
 
-/// From the tip farthest out straight ahead, back along the bit to the bone.
+/// Of all ways that the tip went out of the bone, the end of the longest; 0 when there is none.
+std::size_t endOfLongestWay(std::span<const Pose> poses, std::span<const double> values) {
+  std::size_t first = 0, end = 0;
+  double longest = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (values[i] <= kNothing_mm) {
+      first = i + 1;
+    } else if (const double way = poses[i].tip_mm.z - poses[first].tip_mm.z; way > longest) {
+      longest = way, end = i;
+    }
+  }
+  return end;
+}
+
+/// Back along the bit from where the tip was to the bone that it came out of; 0 unless it came out straight ahead.
+double plungeOf(const Plan& plan, const Pose& pose, const Field& field) {
+  const Vec3 tip = plan.frame->toPatient(pose.tip_mm), axis = plan.frame->directionToPatient(pose.axis);
+  std::vector<Sample> back;
+  for (double d = 0; d <= pose.tip_mm.z; d += kMarch_mm) back.push_back({tip - axis * d, axis});
+  const std::vector<double> along = valuesAt(field, back);
+  const auto inside = std::find_if(along.begin(), along.end(), [](double s) { return s <= 0; });
+  if (inside == along.end()) return 0;
+  const auto steps = static_cast<std::size_t>(inside - along.begin());
+  // What is near the tip by now, bone of the other side perhaps, says nothing of how it came out.
+  return dot(gradientAt(field, back[steps].point_patient), axis) < kAcross ? 0 : kMarch_mm * static_cast<double>(steps);
+}
+
 void findPlunge(const Plan& plan, std::span<const Pose> poses, const Field& field, Breach& breach) {
   std::vector<Sample> tips;
   for (const Pose& p : poses) {
@@ -89,15 +115,9 @@ void findPlunge(const Plan& plan, std::span<const Pose> poses, const Field& fiel
   }
   const std::vector<double> values = valuesAt(field, tips);
   const std::size_t worst = static_cast<std::size_t>(std::max_element(values.begin(), values.end()) - values.begin());
-  for (const std::size_t i : {worst, tips.size() - 1}) {
+  for (const std::size_t i : {worst, endOfLongestWay(poses, values), tips.size() - 1}) {
     if (values[i] <= kNothing_mm || poses[i].tip_mm.z < plan.bit.diameter_mm) continue;
-    const Vec3 tip = tips[i].point_patient, axis = tips[i].axis_patient;
-    if (dot(gradientAt(field, tip), axis) < kAcross) continue;
-    std::vector<Sample> back;
-    for (double d = 0; d <= poses[i].tip_mm.z; d += kMarch_mm) back.push_back({tip - axis * d, axis});
-    const std::vector<double> along = valuesAt(field, back);
-    const auto inside = std::find_if(along.begin(), along.end(), [](double s) { return s <= 0; });
-    breach.plunge_mm = std::max(breach.plunge_mm, kMarch_mm * static_cast<double>(inside - along.begin()));
+    breach.plunge_mm = std::max(breach.plunge_mm, plungeOf(plan, poses[i], field));
   }
 }
 

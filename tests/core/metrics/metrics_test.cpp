@@ -258,6 +258,38 @@ TEST(Plunge, ThroughASlabIsWhatTheTipWentBeyondItsFarFace) {
   EXPECT_EQ(*careful.finish(&field, 1).plunge_mm, 0);
 }
 
+TEST(Plunge, IntoTheBoneOfTheOtherSideIsStillAllOfTheWayBetween) {
+  // Bone to 10 mm, none to 30, bone to 40: as through a pedicle, the canal and the other pedicle. Beside the way out at
+  // 45 mm stands more of it, so that there the nearest bone is across the bit.
+  const Field field = fieldOf([](const Vec3& p) {
+    const double near = std::max(p.y, -10 - p.y), far = std::max(p.y + 30, -40 - p.y), beside = 2.5 - p.x;
+    return std::min({near, far, beside});
+  });
+  const Plan plan = patientPlan({0, 0, 0}, {0, -1, 0}, 45);
+  Accumulator accumulator(plan);
+  drill(accumulator, {0, 0, -1}, {0, 0, 45}, 4600);
+  // The poses kept are 0.25 mm apart, so the last before the far bone may be so much before it.
+  const double plunge = *accumulator.finish(&field, 1).plunge_mm;
+  EXPECT_LE(plunge, 20 + 0.05 + 1e-9);
+  EXPECT_GT(plunge, 20 - 0.25 - 0.05);
+  Accumulator shorter(plan);
+  drill(shorter, {0, 0, -1}, {0, 0, 14}, 1500);
+  EXPECT_NEAR(*shorter.finish(&field, 1).plunge_mm, 4, 0.05 + 1e-9);
+}
+
+TEST(Plunge, OutOfTheBoneSidewaysIsNone) {
+  // Along the face of a slab, and out of it at 20 degrees: the bone's surface runs along the hole.
+  const double slope = 20 * kDegree;
+  const Vec3 outward{std::cos(slope), -std::sin(slope), 0};
+  const Field field = fieldOf([&](const Vec3& p) { return dot(p, outward) - 3; });
+  const Plan plan = patientPlan({0, 0, 0}, {0, -1, 0}, 30);
+  Accumulator accumulator(plan);
+  drill(accumulator, {0, 0, -1}, {0, 0, 30}, 3100);
+  const Metrics m = accumulator.finish(&field, 1);
+  EXPECT_EQ(*m.plunge_mm, 0);
+  EXPECT_GT(*m.breach_mm, 6);
+}
+
 TEST(Accumulator, KeepsBoundedPosesOfALongWanderingDrillAndStillFindsTheBreach) {
   const Plan plan = patientPlan({0, 0, 0}, {0, -1, 0}, 30);
   const Field field = fieldOf(pedicle);
