@@ -1,7 +1,8 @@
 // The real program, serving the built pages over a folder with the demonstration case.
 import { type ChildProcess, execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdirSync } from "node:fs";
-import { resolve } from "node:path";
+import { cpSync, existsSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
 
 export const top = resolve(import.meta.dirname, "../../..");
 export const program = resolve(process.env.SPINALTAP_PROGRAM ?? `${top}/build/release/bin/spinaltap`);
@@ -15,12 +16,25 @@ export interface Served {
 }
 
 export async function serve(): Promise<Served> {
+  makeCase();
+  return start(data);
+}
+
+/** The same case in a folder of its own, to be changed at will; gone with the server. */
+export async function serveCopy(): Promise<Served> {
+  makeCase();
+  const folder = mkdtempSync(join(tmpdir(), "spinaltap-copy-"));
+  cpSync(data, folder, { recursive: true });
+  const { address, stop } = await start(folder);
+  return { address, stop: () => stop().finally(() => rmSync(folder, { recursive: true })) };
+}
+
+function makeCase(): void {
   checkBuilt();
   mkdirSync(data, { recursive: true });
   execFileSync("bash", [`${top}/docker/demo_case.sh`, program, data], {
     stdio: ["ignore", "inherit", "inherit"],
   });
-  return start(data);
 }
 
 /** A server over an empty folder. */

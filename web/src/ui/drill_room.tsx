@@ -230,8 +230,10 @@ function OutsideNote({ session, path }: { session: DrillSession; path: PathInfo 
   const outside = useComputed(() => {
     const readings = session.readings.value;
     if (!readings || readings.depth_mm < 0) return false;
+    const { first_disc, discs, spacing_mm } = path.lattice;
     const limit = path.volume_radius_mm - path.bit.diameter_mm / 2;
-    return Math.hypot(readings.tip[0], readings.tip[1]) > limit + 1e-6;
+    const beside = Math.hypot(readings.tip[0], readings.tip[1]) > limit + 1e-6;
+    return beside || readings.tip[2] > (first_disc + discs - 1) * spacing_mm + 1e-6;
   });
   if (!outside.value) return null;
   return (
