@@ -6,10 +6,8 @@
 #include <deque>
 #include <optional>
 
-#include "core/base/dmath.h"
 #include "core/base/random.h"
-#include "core/haptics/local_model.h"
-#include "core/haptics/passivity.h"
+#include "core/haptics/port.h"
 #include "core/session/session.h"
 
 namespace spinaltap::tradeoff {
@@ -19,8 +17,8 @@ using point_volume::Lattice;
 using point_volume::PointVolume;
 
 constexpr double kTick_s = 5e-5;  // of the hand, and of the reference
-constexpr double kSpacing_mm = 0.2, kRadius_mm = 2.4, kStart_mm = -0.5;
-constexpr double kFeed_mm_s = 2, kLeanTo_mm = 50, kWallPull_mm = 3;
+constexpr double kSpacing_mm = 0.2, kRadius_mm = 2.4, kWallPull_mm = 3;
+constexpr haptics::Approach kApproach;
 constexpr std::size_t kMostWait = 100'000;  // ticks: 5 s, for delays of a second and losses
 constexpr double kSlow_s = 0.1;             // what swings faster than that is no course
 
@@ -59,24 +57,14 @@ Result<PointVolume> boneOf(Bone bone) {
 
 /// Where the hand means to be.
 Vec3 meantAt(const HapticCase& c, double t) {
-  if (!c.spinning) return {0, 0, std::min(kStart_mm + 10 * t, kWallPull_mm)};
-  const double ahead = kStart_mm + kFeed_mm_s * t;
-  switch (c.holding) {
-    case Holding::Leaning:
-      return {0, 0, kLeanTo_mm};
-    case Holding::Trembling: {
-      const SinCos at = sinCos(2 * kPi * 9 * t);
-      return {0.2 * at.sin, 0.2 * at.cos, ahead + 0.2 * at.sin};
-    }
-    default:
-      return {0, 0, ahead};
-  }
+  if (!c.spinning) return {0, 0, std::min(kApproach.start_mm + 10 * t, kWallPull_mm)};
+  return haptics::meantAt(c.holding, kApproach, t);
 }
 
-haptics::Grip gripOf(Holding holding) {
-  return holding == Holding::Tense     ? haptics::tenseGrip()
-         : holding == Holding::Leaning ? haptics::leaningGrip()
-                                       : haptics::relaxedGrip();
+haptics::PortLimits limitsOf(const HapticCase& c) {
+  haptics::PortLimits limits;
+  if (c.guard) limits.most_brake_N_s_mm = 0.5 * haptics::gripOf(c.holding).mass_kg / 1000 * c.rate_hz;
+  return limits;
 }
 
 /// Messages on their way: each comes when its time has come, in that order, which need not be the order of sending.
@@ -126,12 +114,11 @@ class Loop {
       : case_(c),
         session_(std::move(session)),
         hand_(gripOf(c.holding)),
-        local_(c.coupling, {session_.config().speed_rpm, session_.config().bit.diameter_mm}),
-        guard_(c.guard ? 0.5 * gripOf(c.holding).mass_kg / 1000 * c.rate_hz : 0.0),
+        port_(c.coupling, {session_.config().speed_rpm, session_.config().bit.diameter_mm}, limitsOf(c)),
         there_(c, 1),
         back_(c, 2) {
-    hand_.place({0, 0, kStart_mm});
-    local_.place({hand_.at_mm(), {0, 0, 1}});
+    hand_.place({0, 0, kApproach.start_mm});
+    port_.place({hand_.at_mm(), {0, 0, 1}});
   }
 
   /// Until the session has answered the hand waits in the air; then the course begins. Ticks of time that it took.
@@ -173,17 +160,17 @@ class Loop {
     input.spinning = case_.spinning;
     there_.send(now_s, {++seq_, input}, lost_);
     const haptics::Rod rod{hand_.at_mm(), {0, 0, 1}};
-    const haptics::Reaction felt = local_.step(seq_, rod, period_s, case_.spinning, -guard_.given_mJ());
+    const haptics::Reaction felt = port_.move(seq_, rod, period_s, case_.spinning);
     server(now_s);
     while (const std::optional<Answer> answer = back_.take(now_s)) {
       if (answered_ && static_cast<std::int32_t>(answer->seq - answered_seq_) <= 0) continue;
       answered_ = true;
       answered_seq_ = answer->seq;
       last_N_ = answer->force_N;
-      local_.learn(answer->seq, answer->model);
+      port_.learn(answer->seq, answer->model);
     }
-    const Vec3 wanted = case_.extrapolate ? haptics::fromTool(local_.rod().axis, felt.force_N) : last_N_;
-    force_N_ = guard_.step(hand_.at_mm(), wanted, period_s);
+    const Vec3 wanted = case_.extrapolate ? haptics::fromTool(port_.rod().axis, felt.force_N) : last_N_;
+    force_N_ = port_.push(rod, wanted, {}, period_s).force_N;
   }
 
   void server(double now_s) {
@@ -201,12 +188,11 @@ class Loop {
   const HapticCase& case_;
   session::Session session_;
   haptics::Hand hand_;
-  haptics::LocalBit local_;
-  haptics::PassivityGuard guard_;
+  haptics::Port port_;
   Line<Pose> there_;
   Line<Answer> back_;
   Vec3 force_N_, last_N_;
-  double next_s_ = 0, begun_s_ = 0, depth_mm_ = kStart_mm, given_mJ_ = 0, most_given_mJ_ = 0;
+  double next_s_ = 0, begun_s_ = 0, depth_mm_ = kApproach.start_mm, given_mJ_ = 0, most_given_mJ_ = 0;
   std::uint32_t seq_ = 0, answered_seq_ = 0;
   bool answered_ = false;
   std::uint64_t late_ = 0, lost_ = 0;
@@ -263,11 +249,6 @@ std::string_view nameOf(Bone bone) {
   constexpr std::array<std::string_view, 3> kNames{"cortex", "cancellous", "through the wall"};
   return kNames[static_cast<std::size_t>(bone)];
 }
-std::string_view nameOf(Holding holding) {
-  constexpr std::array<std::string_view, 4> kNames{"relaxed", "tense", "leaning", "trembling"};
-  return kNames[static_cast<std::size_t>(holding)];
-}
-
 Result<Course> idealCourse(const HapticCase& haptic_case) {
   const HapticCase ideal_case = idealOf(haptic_case);
   auto loop = loopOf(ideal_case);

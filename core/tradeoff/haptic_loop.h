@@ -6,18 +6,17 @@
 #include <vector>
 
 #include "core/base/result.h"
-#include "core/haptics/hand.h"
+#include "core/haptics/holding.h"
 #include "core/haptics/proxy.h"
 
 namespace spinaltap::tradeoff {
 
 /// What is drilled: solid cortex, solid cancellous bone, or a vertebra's layers and out of the far side.
 enum class Bone : std::uint8_t { Cortex, Cancellous, ThroughTheWall };
-/// Who holds the drill. Relaxed and Tense follow a feed of 2 mm/s; Leaning pushes with 25 N
-/// that fade out 50 mm beyond the entry; Trembling is relaxed with a tremor of 0.2 mm at 9 Hz.
-enum class Holding : std::uint8_t { Relaxed, Tense, Leaning, Trembling };
+/// Who holds the drill, at haptics::Approach's feed.
+using haptics::Holding;
+using haptics::nameOf;
 [[nodiscard]] std::string_view nameOf(Bone bone);
-[[nodiscard]] std::string_view nameOf(Holding holding);
 
 /// A course begins once the session has answered: whoever comes to bone has been in touch before.
 struct HapticCase {

@@ -11,7 +11,7 @@ namespace spinaltap::tradeoff {
 namespace {
 
 constexpr std::array kBones{Bone::Cortex, Bone::Cancellous, Bone::ThroughTheWall};
-constexpr std::array kHoldings{Holding::Relaxed, Holding::Tense, Holding::Leaning, Holding::Trembling};
+using haptics::kHoldings;
 
 Result<void> checkAll(const std::vector<double>& values, std::size_t most, double low, double high,
                       const std::string& what, const std::string& range) {

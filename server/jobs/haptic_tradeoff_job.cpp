@@ -36,7 +36,7 @@ Figures settingOf(const HapticCase& c) {
 
 Figures rowOf(const HapticMeasured& m) {
   Figures row{{"bone", std::string(tradeoff::nameOf(m.setting.bone))},
-              {"holding", std::string(tradeoff::nameOf(m.setting.holding))}};
+              {"holding", std::string(haptics::nameOf(m.setting.holding))}};
   row.update(settingOf(m.setting));
   const tradeoff::HapticResult& r = m.result;
   row.update(Figures{{"force_mean_N", shortened(r.force_mean_N)},
@@ -93,7 +93,7 @@ Figures summaryOf(const std::vector<HapticMeasured>& rows, const std::vector<tra
 
 Figures traceOf(const tradeoff::ForceCourses& courses, const HapticCase& telling) {
   Figures trace{{"bone", std::string(tradeoff::nameOf(telling.bone))},
-                {"holding", std::string(tradeoff::nameOf(telling.holding))},
+                {"holding", std::string(haptics::nameOf(telling.holding))},
                 {"rate_hz", telling.rate_hz},
                 {"delay_ms", telling.delay_ms}};
   for (const char* key : {"t_s", "ideal_N", "answered_N", "extrapolated_N"}) trace[key] = Figures::array();
