@@ -1,5 +1,6 @@
 
 #include "server/cli/commands.h"
+#include "server/haptic_client/remote_drill.h"
 #include "server/jobs/drill_job.h"
 #include "server/jobs/trace.h"
 
@@ -44,9 +45,34 @@ Result<jobs::Figures> onCase(const DrillOptions& options, jobs::DrillJob& job, P
   return jobs::drill(&*store, std::move(*site), job, bar.callback());
 }
 
+Result<jobs::Figures> onServer(const DrillOptions& options, ProgressBar& bar) {
+  haptic_client::RemoteDrill job;
+  const auto server = haptic_client::parseAddress(options.server);
+  if (!server) return fail(server.error().code, "--server: " + server.error().message);
+  job.server = *server, job.case_id = options.case_id, job.path_id = options.path_id;
+  for (const haptics::Holding holding : haptics::kHoldings) {
+    if (haptics::nameOf(holding) == options.hand) job.hand.holding = holding;
+  }
+  job.hand.approach.feed_mm_s = options.feed_mm_s;
+  job.device.rate_hz = options.rate_hz;
+  job.device.max_force_N = options.max_force_N;
+  job.device.damping_N_s_mm = options.damping_N_s_mm;
+  job.device.max_stiffness_N_mm = options.stiffness_N_mm.value_or(0);
+  job.start_mm = options.start_mm, job.depth_mm = options.depth_mm, job.seconds = options.seconds;
+  job.pace = options.lockstep ? haptic_client::Pace::Lockstep : haptic_client::Pace::Real;
+  job.realtime = options.realtime;
+  job.forces = options.forces;
+  return haptic_client::drillRemotely(job, bar.callback());
+}
+
 }  // namespace
 
 Result<Outcome> runDrill(const DrillOptions& options, ProgressBar& bar) {
+  if (!options.server.empty()) {
+    auto figures = onServer(options, bar);
+    if (!figures) return tl::unexpected(figures.error());
+    return Outcome{std::move(*figures)};
+  }
   auto job = jobOf(options);
   if (!job) return tl::unexpected(job.error());
   auto figures = options.volume.empty() ? onCase(options, *job, bar) : onScene(*job, bar);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/vec3.h"
+#include "core/haptics/holding.h"
 #include "core/plan/path.h"
 #include "core/surface/defaults.h"
 #include "server/jobs/drill_tradeoff_job.h"
@@ -79,6 +80,10 @@ struct DrillOptions {
   std::optional<double> stiffness_N_mm;  ///< none: held rigidly
   double speed_rpm = session::Config{}.speed_rpm;
   bool no_store = false;
+  std::string server, hand = "tense";  ///< a simulated hand on a server that runs; as what follows
+  double rate_hz = 1000, feed_mm_s = haptics::Approach{}.feed_mm_s, max_force_N = 0, damping_N_s_mm = 0;
+  std::optional<double> start_mm, depth_mm, seconds;
+  bool lockstep = false, realtime = false;
 };
 
 struct ReplayOptions {

@@ -262,34 +262,85 @@ void addPlan(Program& program) {
   sub->add_option("--data", o->data, kDataHelp);
 }
 
+std::vector<std::string_view> handNames() {
+  std::vector<std::string_view> names;
+  for (const haptics::Holding holding : haptics::kHoldings) names.push_back(haptics::nameOf(holding));
+  return names;
+}
+
+/// `drill --server`. @param elsewhere what has no meaning there.
+void addRemoteDrill(CLI::App* sub, DrillOptions& o, const std::vector<CLI::Option*>& elsewhere) {
+  CLI::Option* server =
+      sub->add_option("--server", o.server, "http://HOST:PORT of one that runs: a simulated hand drills there, live");
+  for (CLI::Option* option : elsewhere) server->excludes(option);
+  sub->add_option("--hand", o.hand, "Who holds the drill")
+      ->check(oneOf(handNames()))
+      ->needs(server)
+      ->capture_default_str();
+  sub->add_option("--rate", o.rate_hz, "Of the device's loop, Hz")
+      ->check(CLI::Range(50.0, 4000.0))
+      ->needs(server)
+      ->capture_default_str();
+  sub->add_option("--feed", o.feed_mm_s, "What the hand means to advance, mm/s (leaning pushes instead)")
+      ->check(CLI::Range(0.01, 100.0))
+      ->needs(server)
+      ->capture_default_str();
+  sub->add_option("--start", o.start_mm, "Of the tip past the entry, mm (default: where the modelled bone begins)")
+      ->check(CLI::Range(-50.0, 0.0))
+      ->needs(server);
+  sub->add_option("--depth", o.depth_mm, "Until the bit's tip is so far past the entry, mm (default: at the target)")
+      ->check(CLI::Range(-50.0, 200.0))
+      ->needs(server);
+  sub->add_option("--seconds", o.seconds, "Or so long (default: three times what the feed needs, and 10 s)")
+      ->check(CLI::Range(0.01, 36000.0))
+      ->needs(server);
+  sub->add_option("--max-force", o.max_force_N, "Of the device, N: forces are scaled to it (default: no limit)")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->needs(server);
+  sub->add_option("--damping", o.damping_N_s_mm,
+                  "Of the device itself, N s/mm: with the rate, it bounds --stiffness (default: not known)")
+      ->check(CLI::Range(1e-6, 10.0))
+      ->needs(server);
+  CLI::Option* lockstep =
+      sub->add_flag("--lockstep", o.lockstep, "Not in real time: each pose waits for its answer; always the same drill")
+          ->needs(server);
+  sub->add_flag("--realtime", o.realtime, "Ask for SCHED_FIFO for this side of the line")
+      ->needs(server)
+      ->excludes(lockstep);
+}
+
 void addDrill(Program& program) {
   auto o = std::make_shared<DrillOptions>();
   CLI::App* sub = add(program, "drill", "Drill without a screen; prints the metrics, keeps a recording", o, runDrill);
   CLI::Option* path_case = sub->add_option("CASE", o->case_id, "Case id");
   CLI::Option* path = sub->add_option("PATH", o->path_id, "Path id");
   path_case->needs(path);
-  sub->add_option("--volume", o->volume, "Instead of CASE PATH: the bare scene volume")
-      ->check(CLI::IsMember({"report"}))
-      ->excludes(path_case);
+  CLI::Option* volume = sub->add_option("--volume", o->volume, "Instead of CASE PATH: the bare scene volume")
+                            ->check(CLI::IsMember({"report"}))
+                            ->excludes(path_case);
   CLI::Option* scene = sub->add_option("--scene", o->scene, "A scripted drill")->check(oneOf(session::sceneNames()));
   CLI::Option* trace =
       sub->add_option("--trace", o->trace, "CSV of poses: t_us, tip x y z, axis x y z (path frame, mm)");
   scene->excludes(trace);
-  sub->add_option("--engine", o->engine, "How points are removed")
-      ->check(oneOf(drill::engineNames()))
-      ->capture_default_str();
-  sub->add_option("--cycles", o->cycles, "At most so many (default: to the end of the path or the trace)")
-      ->check(CLI::NonNegativeNumber);
-  sub->add_option("--speed", o->speed_rpm, "Of the bit, in turns a minute")->capture_default_str();
+  CLI::Option* engine = sub->add_option("--engine", o->engine, "How points are removed")
+                            ->check(oneOf(drill::engineNames()))
+                            ->capture_default_str();
+  CLI::Option* cycles =
+      sub->add_option("--cycles", o->cycles, "At most so many (default: to the end of the path or the trace)")
+          ->check(CLI::NonNegativeNumber);
+  CLI::Option* speed = sub->add_option("--speed", o->speed_rpm, "Of the bit, in turns a minute")->capture_default_str();
   sub->add_option("--stiffness", o->stiffness_N_mm,
-                  "N/mm of the spring between hand and bit (default: none, the bit is held rigidly)");
-  sub->add_option("--out", o->out, "Write the recording here");
+                  "N/mm of the spring between hand and bit (default: none, the bit is held rigidly; on a server, 5)");
+  CLI::Option* out = sub->add_option("--out", o->out, "Write the recording here");
   sub->add_option("--forces", o->forces, "Write force, torque and where the bit was, cycle by cycle, as CSV");
-  sub->add_flag("--no-store", o->no_store, "Do not keep the recording with the case");
-  sub->add_option("--data", o->data, kDataHelp);
+  CLI::Option* no_store = sub->add_flag("--no-store", o->no_store, "Do not keep the recording with the case");
+  CLI::Option* data = sub->add_option("--data", o->data, kDataHelp);
+  addRemoteDrill(sub, *o, {volume, scene, trace, engine, cycles, speed, out, no_store, data});
   sub->parse_complete_callback([o] {
     if (o->volume.empty() && o->path_id.empty()) throw CLI::RequiredError("CASE and PATH, or --volume report");
-    if (o->scene.empty() && o->trace.empty()) throw CLI::RequiredError("--scene or --trace");
+    if (o->scene.empty() && o->trace.empty() && o->server.empty()) {
+      throw CLI::RequiredError("--scene, --trace or --server");
+    }
   });
 }
 

@@ -27,7 +27,7 @@ std::array<std::byte, kFeedbackFrame> feedbackFrame() {
 }  // namespace
 
 struct Echo::Peer {
-  Socket socket;
+  haptic_client::Socket socket;
   std::array<std::byte, 64 * kPoseFrame> in{};
   std::size_t have = 0;  ///< of a frame whose rest is still to come
 };
@@ -51,10 +51,10 @@ Echo::~Echo() {
   ::close(poll_);
 }
 
-Result<Line> Echo::connect() {
-  auto here = connectTo("127.0.0.1", port_);
+Result<haptic_client::Line> Echo::connect() {
+  auto here = haptic_client::connectTo({"127.0.0.1", port_}, std::chrono::seconds(30));
   if (!here) return tl::unexpected(here.error());
-  Socket there(::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+  haptic_client::Socket there(::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
   const int yes = 1;
   ::setsockopt(there.handle(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   epoll_event event{};
@@ -65,7 +65,7 @@ Result<Line> Echo::connect() {
     return fail(ErrorCode::Io, "load: the echo has no handle left");
   }
   peers_.push_back(std::move(peer));
-  return Line(std::move(*here));
+  return haptic_client::Line(std::move(*here));
 }
 
 void Echo::run() {

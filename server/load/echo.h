@@ -5,7 +5,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/load/line.h"
+#include "server/haptic_client/line.h"
 
 namespace spinaltap::load {
 
@@ -17,7 +17,7 @@ class Echo {
   Echo& operator=(const Echo&) = delete;
   ~Echo();
   /// @error Io.
-  [[nodiscard]] Result<Line> connect();
+  [[nodiscard]] Result<haptic_client::Line> connect();
 
  private:
   struct Peer;

@@ -14,18 +14,36 @@
 #include <vector>
 
 #include "core/session/scenes.h"
+#include "server/haptic_client/rest.h"
 #include "server/load/echo.h"
-#include "server/load/line.h"
 #include "server/load/own_server.h"
 #include "server/ws/realtime.h"
 
 namespace spinaltap::load {
 namespace {
 using Clock = std::chrono::steady_clock;
+using haptic_client::Line;
 
 constexpr double kMostEcho_s = 10;
 constexpr double kGrace_s = 1;       // for the last answers
 constexpr std::size_t kRing = 4096;  // poses under way that are told apart
+constexpr std::chrono::seconds kPatience{30};
+
+/// Of a feedback, without the cost of decoding it: this side must not be what is measured.
+std::optional<std::uint32_t> seqOf(std::span<const std::byte> message) {
+  const bool is_feedback =
+      message.size() == wire::kFeedbackBytes && message[0] == static_cast<std::byte>(wire::MessageType::Feedback);
+  if (!is_feedback) return {};
+  return wire::ByteReader(message.subspan(2)).u32();
+}
+
+Result<Line> openLine(const Target& target, bool rigid) {
+  const auto id = haptic_client::makeSession(target.server, target.case_id, target.path_id, kPatience);
+  if (!id) return tl::unexpected(id.error());
+  wire::Hello hello;
+  hello.rigid = rigid;
+  return Line::open(target.server, *id, hello, kPatience);
+}
 
 struct Measured {
   std::vector<std::uint32_t> round_trips_ns;
@@ -90,7 +108,7 @@ void Driver::send(Trainee& trainee, Clock::time_point now) {
   trainee.sent_at[trainee.next % kRing] = now;
   const session::Input pose =
       session::sceneInput(session::Scene::Hand, std::min<std::uint64_t>(trainee.next, session::kMostSceneCycles));
-  trainee.ended = !trainee.line.send(trainee.next, pose);
+  trainee.ended = !trainee.line.send(trainee.next, {&pose, 1});
   ++trainee.next;
   ++measured_.sent;
 }
@@ -103,7 +121,10 @@ void Driver::sendDue(Clock::time_point now) {
 }
 
 void Driver::receive(Trainee& trainee) {
-  const bool alive = trainee.line.receive([&](std::uint32_t seq) {
+  const bool alive = trainee.line.receive([&](std::span<const std::byte> message) {
+    const auto answered = seqOf(message);
+    if (!answered) return;
+    const std::uint32_t seq = *answered;
     const Clock::time_point now = Clock::now();
     // a feedback that answers several is the answer of the last; the others never had one of their own
     if (seq >= trainee.next || trainee.next - seq > kRing) return;
@@ -198,7 +219,7 @@ Result<jobs::Figures> drive(const LoadJob& job, const Target& target, const OwnS
                             const jobs::Progress& progress) {
   std::vector<Line> lines;
   for (int i = 0; i < job.sessions; ++i) {
-    auto line = Line::open(target, job.rigid);
+    auto line = openLine(target, job.rigid);
     if (!line) return tl::unexpected(line.error());
     lines.push_back(std::move(*line));
   }

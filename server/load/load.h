@@ -6,14 +6,14 @@
 #include <string>
 
 #include "core/base/result.h"
+#include "server/haptic_client/socket.h"
 #include "server/jobs/figures.h"
 
 namespace spinaltap::load {
 
 /// A server that runs, and a path of one of its cases.
 struct Target {
-  std::string host = "127.0.0.1";
-  std::uint16_t port = 0;
+  haptic_client::Address server;
   std::string case_id, path_id;
 };
 

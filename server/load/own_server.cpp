@@ -104,8 +104,9 @@ Result<void> OwnServer::launch(bool realtime) {
   if (realtime) realtime_line_ = readLine(out[0]);
   ::close(out[0]);
   const auto colon = line.rfind(':');
-  target_.port = colon == std::string::npos ? 0 : static_cast<std::uint16_t>(std::atoi(line.c_str() + colon + 1));
-  if (target_.port == 0) return fail(ErrorCode::Io, "load: the server did not start");
+  target_.server.port =
+      colon == std::string::npos ? 0 : static_cast<std::uint16_t>(std::atoi(line.c_str() + colon + 1));
+  if (target_.server.port == 0) return fail(ErrorCode::Io, "load: the server did not start");
   return {};
 }
 

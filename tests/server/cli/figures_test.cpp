@@ -5,9 +5,11 @@
 #include <map>
 #include <regex>
 #include <set>
+#include <sstream>
 
 #include "core/recording/recording.h"
 #include "tests/server/program.h"
+#include "tests/server/small_case.h"
 #include "tests/server/temporary_folder.h"
 
 namespace spinaltap::test {
@@ -347,6 +349,63 @@ TEST(Replay, OfACutRecordingVerifiesWhatIsLeft) {
   EXPECT_EQ(cut.code, cut.json()["verified"].get<bool>() ? 0 : 1);
   std::filesystem::resize_file(file, 100);
   EXPECT_EQ(run({"replay", file}).code, 1);
+}
+
+TEST(RemoteDrill, PrintsFiguresThatAreDocumentedAndWritesForcesRowByRow) {
+  const TemporaryFolder folder;
+  store::Store store = store::Store::open(folder.path() / "data").value();
+  const SmallCase small = makeSmallCase(store);
+  const Server server((folder.path() / "data").string());
+  const std::string url = "http://127.0.0.1:" + std::to_string(server.port());
+  const std::string csv = (folder.path() / "forces.csv").string();
+  const auto finished = run({"drill", "--server", url, small.case_id, small.path_id, "--hand", "leaning", "--depth",
+                             "2", "--lockstep", "--forces", csv, "--json"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  EXPECT_EQ(finished.err, "");
+  const Json figures = finished.json();
+  expectDocumented("drill, on a server", figures);
+  EXPECT_EQ(figures["reached"], true);
+  EXPECT_GE(figures["depth_mm"], 0.5);
+  EXPECT_EQ(figures["cycles"], figures["poses"]);
+  EXPECT_LE(figures["most_given_mJ"], 1e-9);
+  std::ifstream in(csv);
+  std::string line;
+  std::getline(in, line);
+  EXPECT_EQ(line.rfind("t_us,depth_mm,thrust_N,side_x_N,side_y_N,torque_Nmm,tip_x_mm,tip_y_mm,tip_z_mm,removed,", 0),
+            0U)
+      << "as offline: " << line;
+  int rows = 0;
+  std::uint64_t removed = 0;
+  for (; std::getline(in, line); ++rows) {
+    std::vector<std::string> cells;
+    std::stringstream row(line);
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    ASSERT_EQ(cells.size(), 17U) << line;
+    removed += std::stoull(cells[9]);
+  }
+  EXPECT_EQ(rows, figures["answered"]);
+  EXPECT_EQ(removed, figures["removed"]);
+  const Json replayed =
+      run({"replay", figures["recording_id"], "--data", (folder.path() / "data").string(), "--json"}).json();
+  EXPECT_EQ(replayed["verified"], true);
+  EXPECT_EQ(replayed["cycles"], figures["poses"]);
+}
+
+TEST(RemoteDrill, SaysInOneLineWhatIsWrong) {
+  const TemporaryFolder folder;
+  const Server server(folder.path().string());
+  const std::string url = "http://127.0.0.1:" + std::to_string(server.port());
+  const auto failing = [](const std::string& at) {
+    const auto finished = run({"drill", "--server", at, "czzzzzzz", "pzzzzzzz"});
+    EXPECT_EQ(finished.code, 1);
+    EXPECT_EQ(finished.out, "");
+    return finished.err;
+  };
+  EXPECT_EQ(failing(url), "spinaltap: there is no case czzzzzzz\n");
+  EXPECT_EQ(failing("https://here"),
+            "spinaltap: --server: 'https://here' is no server's address (http://HOST:PORT): "
+            "http is what this program speaks\n");
+  EXPECT_EQ(failing("http://127.0.0.1:1"), "spinaltap: no server at 127.0.0.1:1: Connection refused\n");
 }
 
 TEST(LoadFigures, AreDocumentedAndEveryPoseIsAnswered) {
