@@ -1,7 +1,7 @@
 // A drill whose line to the server breaks: in a real browser, over a TCP connection that is really cut.
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
-import { agreedCycle, keepPicture, kSlow_ms, launch, openPage, readingOf, until } from "./browser";
+import { agreedCycle, kSlow_ms, launch, openPage, readingOf, until } from "./browser";
 import { type CuttableLine, proxyTo } from "./proxy";
 import { type Served, serve } from "./served";
 
@@ -60,7 +60,6 @@ describe("a drill whose line breaks", () => {
     proxy.cut();
     await badge("reconnecting");
     await drillsOn(300);
-    await keepPicture(page, "reconnecting");
     proxy.heal();
     await agreesPast(await cycles());
     expect(proxy.sockets()).toBeGreaterThan(1);

@@ -205,6 +205,13 @@ function slowness(places: [number, number][], from_mm: number, to_mm: number): n
   return (last[0] - first[0]) / (last[1] - first[1]);
 }
 
+/** Waits in the page itself, so that it is seen at once. */
+async function deeperThan(drilling: Page, depth_mm: number): Promise<void> {
+  const is_deeper = (wanted: number): boolean =>
+    Number(document.querySelector('[data-reading="Depth"]')?.textContent) > wanted;
+  await drilling.waitForFunction(is_deeper, depth_mm, { polling: 10 });
+}
+
 /** Of the drill that is finished, as the page saw it. */
 let agreed = 0;
 
@@ -236,11 +243,7 @@ describe("a drill", () => {
       return (await reading("Depth")) > 4.5;
     });
     // Behind it the bit is fast: let go as soon as the page shows it.
-    await page.waitForFunction(
-      () => Number(document.querySelector('[data-reading="Depth"]')?.textContent) > 8,
-      null,
-      { polling: 10 },
-    );
+    await deeperThan(page, 8);
     await page.keyboard.up("KeyW");
     expect(peak, "the cortex took nearly all of the push").toBeGreaterThan(20);
     expect(peak).toBeLessThan(35);
@@ -421,11 +424,11 @@ describe("the README's picture", () => {
     await large.getByLabel("Keys push").selectOption("30");
     await large.getByRole("button", { name: "Cut-away" }).click();
     await large.keyboard.down("KeyW");
-    const depth = large.locator('[data-reading="Depth"]');
     await large.locator("main").focus();
-    while (Number(await depth.textContent()) < 18) await large.waitForTimeout(100);
-    await large.screenshot({ path: resolve(top, file!), timeout: kSlow_ms });
+    await deeperThan(large, 10);
     await large.keyboard.up("KeyW");
+    await large.locator('[data-reading="Cycles"]', { hasText: "idle" }).waitFor();
+    await large.screenshot({ path: resolve(top, file!), timeout: kSlow_ms });
     await large.context().close();
   });
 });
