@@ -25,24 +25,34 @@ Result<void> Line::greet(const wire::Hello& hello) {
   if (!sendAll(handle(), {reinterpret_cast<const char*>(out.bytes().data()), out.bytes().size()})) {
     return fail(ErrorCode::Io, "the server ended the line before it was greeted");
   }
-  ws::FrameReader::Frame frame = frames_.next();
-  while (frame.got == ws::FrameReader::Got::Nothing || frame.got == ws::FrameReader::Got::Ping) {
+  for (;;) {
+    const auto bytes = nextMessage();
+    if (!bytes) return tl::unexpected(bytes.error());
+    auto message = wire::decodeServerMessage(*bytes);
+    if (!message) return fail(ErrorCode::Corrupt, "the server's welcome: " + message.error().message);
+    if (std::holds_alternative<wire::SessionStatus>(*message)) continue;
+    if (const auto* refused = std::get_if<wire::Refused>(&*message)) return fail(ErrorCode::Limit, refused->reason);
+    const auto* welcome = std::get_if<wire::Welcome>(&*message);
+    if (welcome == nullptr) return fail(ErrorCode::Corrupt, "the server's first message is no welcome");
+    welcome_ = *welcome;
+    return {};
+  }
+}
+
+Result<std::span<const std::byte>> Line::nextMessage() {
+  for (;;) {
+    const ws::FrameReader::Frame frame = frames_.next();
+    if (frame.got == ws::FrameReader::Got::Binary) return frame.payload;
     if (frame.got == ws::FrameReader::Got::Nothing) {
       const auto room = frames_.room();
       const ssize_t count = ::recv(handle(), room.data(), room.size(), 0);
       if (count <= 0) return fail(ErrorCode::Io, "the server ended the line without a welcome");
       frames_.filled(static_cast<std::size_t>(count));
+      continue;
     }
-    frame = frames_.next();
+    control(frame);
+    if (ended_) return fail(ErrorCode::Io, "the server closed the line");
   }
-  if (frame.got != ws::FrameReader::Got::Binary) return fail(ErrorCode::Io, "the server closed the line");
-  auto message = wire::decodeServerMessage(frame.payload);
-  if (!message) return fail(ErrorCode::Corrupt, "the server's welcome: " + message.error().message);
-  if (const auto* refused = std::get_if<wire::Refused>(&*message)) return fail(ErrorCode::Limit, refused->reason);
-  const auto* welcome = std::get_if<wire::Welcome>(&*message);
-  if (welcome == nullptr) return fail(ErrorCode::Corrupt, "the server's first message is no welcome");
-  welcome_ = *welcome;
-  return {};
 }
 
 bool Line::send(std::uint32_t first_seq, std::span<const session::Input> poses) {

@@ -59,6 +59,7 @@ class Line {
   bool readOnce();
   void control(const ws::FrameReader::Frame& frame);
   [[nodiscard]] Result<void> greet(const wire::Hello& hello);
+  [[nodiscard]] Result<std::span<const std::byte>> nextMessage();
 
   Socket socket_;
   ws::FrameReader frames_{ws::Side::Server};

@@ -268,7 +268,9 @@ void DrillLoop::checkClient(Client& client) {
     flush(client);
   }
   Seat* seat = client.kind == Client::Kind::Driver ? client.seat : nullptr;
-  const bool behind = client.has_backlog && now_ - client.backlog_since > options_.overload;
+  // Poses that come while the case is being read wait for it; the welcome comes before anything else.
+  const bool live = seat && seat->phase == Seat::Phase::Live;
+  const bool behind = live && client.has_backlog && now_ - client.backlog_since > options_.overload;
   if (seat && behind && !seat->overloaded) {
     ++metrics_.overloads;
     client.connection.send(wire::SessionStatus{wire::StatusCode::Overload, "poses come faster than they are drilled"});
