@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/dmath.h"
+#include "core/drill/simd_probe.h"
 
 namespace spinaltap::drill {
 namespace {
@@ -18,47 +19,6 @@ SinCos direction(std::size_t i) {
   return sinCosOfTurn(static_cast<int>((i * static_cast<std::size_t>(kGoldenAngle)) % kTurn), kTurn);
 }
 
-/// The direction of (x, y) in turns, 0 .. 1, to within 4e-9.
-/// Coefficients: Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.49 (error of the arctangent 2e-8).
-double roughTurn(double x, double y) {
-  const double a = std::abs(x), b = std::abs(y), longer = std::max(a, b);
-  if (!(longer > 0)) return 0;
-  const double t = std::min(a, b) / longer, q = t * t;
-  constexpr double kSeries[] = {0.0028662257, -0.0161657367, 0.0429096138, -0.0752896400, 0.1065626393, -0.1420889944,
-                                0.1999355085, -0.3333314528, 1.0};
-  double series = 0;
-  for (const double next : kSeries) series = series * q + next;
-  double turn = series * t * (0.5 / kPi);
-  if (b > a) turn = 0.25 - turn;
-  if (x < 0) turn = 0.5 - turn;
-  if (y < 0) turn = 1.0 - turn;
-  return turn;
-}
-
-// A place is at most half a spacing from its disc and half a spacing from its ring; on ring 1, whose slots are widest,
-// half a spacing outward and half a slot on, that is sqrt(1.5^2 + 1 - 3 cos 30) = 0.81 spacings in the disc's plane and
-// 0.95 in all. Slots near a boundary may be told apart wrongly by 4e-9 turns, which is less than what 0.95 was rounded.
-struct Nearest {
-  const point_volume::PointVolume& volume;
-  double per_mm;
-
-  explicit Nearest(const point_volume::PointVolume& v) : volume(v), per_mm(1.0 / v.lattice.spacing_mm) {}
-
-  [[nodiscard]] std::uint16_t density(const Vec3& place_mm) const {
-    const Lattice& lattice = volume.lattice;
-    // Above zero a cast is the floor, which would be a call.
-    const double disc = place_mm.z * per_mm - lattice.first_disc + 0.5;
-    if (!(disc >= 0 && disc < lattice.discs)) return 0;
-    const double out = std::sqrt(place_mm.x * place_mm.x + place_mm.y * place_mm.y) * per_mm + 0.5;
-    if (!(out < lattice.rings)) return 0;
-    const int ring = static_cast<int>(out), slots = Lattice::slotsOf(ring);
-    const double past = roughTurn(place_mm.x, place_mm.y) * slots + 0.5;
-    const int slot = static_cast<int>(past);
-    const std::uint32_t index = lattice.index({static_cast<int>(disc), ring, slot < slots ? slot : slot - slots});
-    return volume.isAlive(index) ? volume.density_mg_cm3[index] : std::uint16_t{0};
-  }
-};
-
 }  // namespace
 
 Probe::Probe(const Lattice& lattice, const plan::Bit& bit)
@@ -70,7 +30,7 @@ Probe::Probe(const Lattice& lattice, const plan::Bit& bit)
   out_across_mm_ = out_mm_ * cone_mm_ / slant, out_ahead_mm_ = out_mm_ * radius_mm_ / slant;
   for (std::size_t i = 0; i < kTipFacets; ++i) {
     const SinCos at = direction(i);
-    directions_[i] = {static_cast<float>(at.cos), static_cast<float>(at.sin)};
+    out_x_[i] = static_cast<float>(at.cos), out_y_[i] = static_cast<float>(at.sin);
   }
   const double each = kPi * radius_mm_ * radius_mm_ / kTipFacets;
   of_tip_ = {each, each * cone_mm_ / radius_mm_};
@@ -82,26 +42,39 @@ Probe::Probe(const Lattice& lattice, const plan::Bit& bit)
 }
 
 Facet Probe::facet(std::size_t i) const {
-  const Direction& at = directions_[i % kTipFacets];
+  const double out_x = out_x_[i % kTipFacets], out_y = out_y_[i % kTipFacets];
   if (i >= kTipFacets) {
     const double part = (static_cast<double>(i - kTipFacets) + 0.5) / kShaftFacets;
-    return {radius_mm_ + out_mm_, -cone_mm_ - shaft_mm_ * part, at.x, at.y};
+    return {radius_mm_ + out_mm_, -cone_mm_ - shaft_mm_ * part, out_x, out_y};
   }
   const double across = radius_mm_ * std::sqrt((static_cast<double>(i) + 0.5) / kTipFacets);
-  return {across + out_across_mm_, out_ahead_mm_ - across * cone_mm_ / radius_mm_, at.x, at.y};
+  return {across + out_across_mm_, out_ahead_mm_ - across * cone_mm_ / radius_mm_, out_x, out_y};
 }
 
 double Probe::clearOfLattice_mm(const BitPose& pose) const {
   return std::max(0.0, norm(pose.tip_mm - middle_mm_) - near_mm_);
 }
 
+// A place is at most half a spacing from its disc and half a spacing from its ring; on ring 1, whose slots are widest,
+// half a spacing outward and half a slot on, that is sqrt(1.5^2 + 1 - 3 cos 30) = 0.81 spacings in the disc's plane and
+// 0.95 in all. Slots near a boundary may be told apart wrongly by 4e-9 turns, which is less than what 0.95 was rounded.
 void Probe::look(const point_volume::PointVolume& volume, const BitPose& pose, const Vec3& x, const Vec3& y,
                  std::span<std::uint16_t> densities) const {
-  const Nearest nearest(volume);
-  for (std::size_t i = 0; i < std::min(count(), densities.size()); ++i) {
+  const std::size_t looks = std::min(count(), densities.size());
+  std::array<double, kMostFacets> x_mm, y_mm, z_mm;
+  for (std::size_t i = 0; i < looks; ++i) {
     const Facet at = facet(i);
-    const Vec3 out = x * (at.out_x * at.across_mm) + y * (at.out_y * at.across_mm);
-    densities[i] = nearest.density(pose.tip_mm + out + pose.axis * at.z_mm);
+    x_mm[i] = at.out_x * at.across_mm, y_mm[i] = at.out_y * at.across_mm, z_mm[i] = at.z_mm;
+  }
+  std::array<std::uint32_t, kMostFacets> nearest;
+  nearestPoints(volume.lattice, {pose.tip_mm, x, y, pose.axis}, {x_mm.data(), y_mm.data(), z_mm.data()}, looks,
+                nearest.data());
+  for (std::size_t i = 0; i < looks; ++i) {
+    // Without a branch, which would be taken at random.
+    const bool known = nearest[i] != kNoPoint;
+    const std::uint32_t point = known ? nearest[i] : 0;
+    const unsigned met = static_cast<unsigned>(known) & static_cast<unsigned>(volume.isAlive(point));
+    densities[i] = static_cast<std::uint16_t>(volume.density_mg_cm3[point] * met);
   }
 }
 

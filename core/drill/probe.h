@@ -41,7 +41,7 @@ class Probe {
   [[nodiscard]] std::size_t count() const { return shaft_mm_ > 0 ? kMostFacets : kTipFacets; }
   [[nodiscard]] const FacetArea& areaOf(std::size_t i) const { return i < kTipFacets ? of_tip_ : of_shaft_; }
 
-  /// The density of the alive point nearest to each facet; 0 where that one is removed or none is.
+  /// The density of the point nearest to each facet; 0 where that one is removed or none is.
   /// + - * / and sqrt only; does not allocate. @pre as Engine::step; x and y are the tool's, in the path frame;
   /// densities shorter than count() leave the last facets out.
   void look(const point_volume::PointVolume& volume, const BitPose& pose, const Vec3& x, const Vec3& y,
@@ -51,10 +51,7 @@ class Probe {
   [[nodiscard]] double clearOfLattice_mm(const BitPose& pose) const;
 
  private:
-  struct Direction {
-    float x, y;
-  };
-  std::array<Direction, kTipFacets> directions_;  ///< of the tip's facets, and again of the shaft's
+  std::array<float, kTipFacets> out_x_, out_y_;  ///< of the tip's facets, and again of the shaft's
   double radius_mm_, cone_mm_, shaft_mm_, out_mm_;
   double out_across_mm_ = 0, out_ahead_mm_ = 0;  ///< of the way out along the cone's normal
   FacetArea of_tip_, of_shaft_;

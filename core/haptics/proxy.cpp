@@ -10,6 +10,7 @@ constexpr int kMostRounds = 100;         // of Newton; a bound that ends it, wha
 constexpr double kNudge = 1e-12;         // of the way in the open, where the search sets off
 constexpr double kShortestPart = 1e-13;  // of a step: one that runs into a wall head on is shortened to 2 / kSideWall
 constexpr double kCreep_mm_s = 0.01;     // a side's threshold is reached at this velocity
+constexpr double kRounding = 1e-16;      // of a sum, in parts of its terms
 constexpr double kSideWall = 1e9;        // a bit that stands gives way by a billionth of the pull
 
 /// Of tip and grip across the axis: tip x, tip y, grip x, grip y.
@@ -22,49 +23,71 @@ Across weights(const SideContact& side) {
 
 double product(const Across& a, const Across& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]; }
 
-/// What a side answers to an approach, how fast that grows, and the power potential whose slope it is.
-struct Answer {
-  double force_N = 0, slope_N_s_mm = 0, potential = 0;
+/// One side: what it answers to the rod's motion.
+struct Side {
+  Across weight{};
+  double slope_N_s_mm = 0;  ///< once it cuts, or of a wall
+  double steep_N_s_mm = 0;  ///< more than that, while it creeps: up to its threshold
+  double creep_mm_s = 0;    ///< how fast it creeps at most
+
+  Side() = default;
+  Side(const SideContact& contact, const Drive& drive, bool spinning, double wall_N_s_mm) : weight(weights(contact)) {
+    const Resistance side = sideResistance(contact.area_mm2, drive, spinning);
+    slope_N_s_mm = side.wall ? wall_N_s_mm : side.slope_N_s_mm;
+    steep_N_s_mm = std::min(side.threshold_N / kCreep_mm_s, wall_N_s_mm);
+    creep_mm_s = std::max(kCreep_mm_s, side.threshold_N / wall_N_s_mm);
+  }
+  [[nodiscard]] double force_N(double approach_mm_s) const {
+    return steep_N_s_mm * std::min(approach_mm_s, creep_mm_s) + slope_N_s_mm * approach_mm_s;
+  }
 };
-Answer answerOf(const Resistance& side, double approach_mm_s, double wall_N_s_mm) {
-  const double v = approach_mm_s;
-  if (!(v > 0)) return {};
-  const double slope = side.wall ? wall_N_s_mm : side.slope_N_s_mm;
-  const double steep = std::min(side.threshold_N / kCreep_mm_s, wall_N_s_mm);
-  const double creep_mm_s = std::max(kCreep_mm_s, side.threshold_N / wall_N_s_mm), creeping = std::min(v, creep_mm_s);
-  return {steep * creeping + slope * v, slope + (v < creep_mm_s ? steep : 0.0),
-          steep * creeping * (v - 0.5 * creeping) + 0.5 * slope * v * v};
-}
+
+/// Where the rod moves at some velocity: give v^2 / 2 - pull v + the sides' powers, a convex potential that is least
+/// where everything balances; which way it falls, and how it bends (the lower half).
+struct Balance {
+  double potential = 0;
+  Across falls{};
+  std::array<Across, 4> bends{};
+};
 
 /// All sides together.
 struct Sides {
-  std::array<Across, kMostSides> weight;
-  std::array<Resistance, kMostSides> resistance;
+  std::array<Side, kMostSides> side;
   std::size_t count;
   double give;  ///< of the springs, N s/mm
 
   Sides(const Meeting& meeting, const Drive& drive, bool spinning, double give_N_s_mm)
       : count(meeting.side_count), give(give_N_s_mm) {
+    for (std::size_t i = 0; i < count; ++i) side[i] = Side(meeting.sides[i], drive, spinning, kSideWall * give);
+  }
+
+  [[nodiscard]] Balance balance(const Across& pull, const Across& v) const {
+    Balance sum;
+    sum.potential = 0.5 * give * product(v, v) - product(pull, v);
+    for (std::size_t n = 0; n < 4; ++n) sum.bends[n][n] = give, sum.falls[n] = pull[n] - give * v[n];
     for (std::size_t i = 0; i < count; ++i) {
-      weight[i] = weights(meeting.sides[i]);
-      resistance[i] = sideResistance(meeting.sides[i].area_mm2, drive, spinning);
+      const Side& one = side[i];
+      const double approach = product(one.weight, v);
+      if (!(approach > 0)) continue;
+      const double creeping = std::min(approach, one.creep_mm_s), force_N = one.force_N(approach);
+      const double slope = one.slope_N_s_mm + (approach < one.creep_mm_s ? one.steep_N_s_mm : 0.0);
+      sum.potential +=
+          one.steep_N_s_mm * creeping * (approach - 0.5 * creeping) + 0.5 * one.slope_N_s_mm * approach * approach;
+      for (std::size_t n = 0; n < 4; ++n) {
+        sum.falls[n] -= force_N * one.weight[n];
+        for (std::size_t m = 0; m <= n; ++m) sum.bends[n][m] += slope * one.weight[n] * one.weight[m];
+      }
     }
-  }
-  [[nodiscard]] Answer answer(std::size_t i, const Across& v) const {
-    return answerOf(resistance[i], product(weight[i], v), kSideWall * give);
-  }
-  /// give v^2 / 2 - pull v + the sides' potentials: convex, and least where everything balances.
-  [[nodiscard]] double potential(const Across& pull, const Across& v) const {
-    double sum = 0.5 * give * product(v, v) - product(pull, v);
-    for (std::size_t i = 0; i < count; ++i) sum += answer(i, v).potential;
     return sum;
   }
   /// Their force on the rod; against every motion, for each side pushes back only where it is approached.
   [[nodiscard]] Across force(const Across& v) const {
     Across sum{};
     for (std::size_t i = 0; i < count; ++i) {
-      const double f = answer(i, v).force_N;
-      for (std::size_t n = 0; n < 4; ++n) sum[n] -= f * weight[i][n];
+      const double approach = product(side[i].weight, v);
+      if (!(approach > 0)) continue;
+      const double force_N = side[i].force_N(approach);
+      for (std::size_t n = 0; n < 4; ++n) sum[n] -= force_N * side[i].weight[n];
     }
     return sum;
   }
@@ -87,38 +110,27 @@ void solve(std::array<Across, 4>& a, Across& b) {
   }
 }
 
-/// Newton's step from v: the potential is a quadratic wherever no side changes between free, creeping and cutting.
-Across newton(const Sides& sides, const Across& pull, const Across& v) {
-  std::array<Across, 4> hessian{};
-  Across step{};
-  for (std::size_t n = 0; n < 4; ++n) hessian[n][n] = sides.give, step[n] = pull[n] - sides.give * v[n];
-  for (std::size_t i = 0; i < sides.count; ++i) {
-    const Answer answer = sides.answer(i, v);
-    for (std::size_t n = 0; n < 4; ++n) {
-      const double w = sides.weight[i][n];
-      step[n] -= answer.force_N * w;
-      for (std::size_t m = 0; m <= n; ++m) hessian[n][m] += answer.slope_N_s_mm * w * sides.weight[i][m];
-    }
-  }
-  solve(hessian, step);
-  return step;
-}
-
-/// The velocities across the axis at which pulls and sides balance.
+/// The velocities across the axis at which pulls and sides balance. Newton: the potential is a quadratic wherever no
+/// side changes between free, creeping and cutting; where one does on the way, a step is shortened until the potential
+/// falls.
 Across velocityAcross(const Sides& sides, const Across& pull) {
   // Set off the way the springs pull, so that the sides on that way count from the first step on.
   Across v{};
   for (std::size_t n = 0; n < 4; ++n) v[n] = kNudge * pull[n] / sides.give;
-  double potential = sides.potential(pull, v);
+  Balance here = sides.balance(pull, v);
   for (int round = 0; round < kMostRounds; ++round) {
-    const Across step = newton(sides, pull, v);
+    Across step = here.falls;
+    solve(here.bends, step);
+    // Half of that is what the step should gain; less than rounding leaves of the potential can't be seen.
+    const double gain = product(here.falls, step);
+    if (gain <= kRounding * (std::abs(here.potential) + std::abs(product(pull, v)))) break;
     bool moved = false;
-    for (double part = 1.0; !moved && part > kShortestPart; part *= 0.5) {  // shorter where a side changes on the way
+    for (double part = 1.0; !moved && part > kShortestPart; part *= 0.5) {
       Across next = v;
       for (std::size_t n = 0; n < 4; ++n) next[n] += part * step[n];
-      const double lower = sides.potential(pull, next);
-      moved = lower < potential;
-      if (moved) v = next, potential = lower;
+      const Balance there = sides.balance(pull, next);
+      moved = there.potential < here.potential;
+      if (moved) v = next, here = there;
     }
     if (!moved || product(step, step) <= 1e-24 * product(v, v)) break;
   }

@@ -13,22 +13,20 @@ std::size_t eighthOf(double x, double y) {
   return 2 * quarter + (quarter % 2 == 0 ? steep : !steep);
 }
 
+/// 0 for the tip's facets, 1 to 3 for those of the shaft's thirds from the cone backward.
+std::size_t stretchOf(std::size_t i) {
+  constexpr std::size_t kTip = drill::Probe::kTipFacets, kShaft = drill::Probe::kShaftFacets;
+  return i < kTip ? 0 : 1 + 3 * (2 * (i - kTip) + 1) / (2 * kShaft);
+}
+
 }  // namespace
 
 Contact::Contact(const point_volume::Lattice& lattice, const plan::Bit& bit)
-    : spacing_mm_(lattice.spacing_mm),
-      shape_(drill::shapeOf(bit)),
-      probe_(lattice, bit),
-      cone_mm_(bit.cone_length_mm),
-      shaft_mm_(bit.length_mm - bit.cone_length_mm) {}
-
-std::size_t Contact::groupOf(std::size_t i, const drill::Facet& facet) const {
-  std::size_t stretch = 0;
-  if (i >= drill::Probe::kTipFacets) {
-    const double third = 3 * (-facet.z_mm - cone_mm_) / shaft_mm_;
-    stretch = third < 1 ? 1 : third < 2 ? 2 : 3;
+    : spacing_mm_(lattice.spacing_mm), shape_(drill::shapeOf(bit)), probe_(lattice, bit) {
+  for (std::size_t i = 0; i < eighth_.size(); ++i) {
+    const drill::Facet facet = probe_.facet(i);
+    eighth_[i] = static_cast<std::uint8_t>(eighthOf(facet.out_x, facet.out_y));
   }
-  return stretch * kDirections + eighthOf(facet.out_x, facet.out_y);
 }
 
 haptics::Meeting Contact::meet(const point_volume::PointVolume& volume, const drill::BitPose& pose) const {
@@ -48,7 +46,7 @@ haptics::Meeting Contact::meet(const point_volume::PointVolume& volume, const dr
     meeting.frontal_mm2 += hardness * whole.frontal_mm2;
     const double area = hardness * whole.side_mm2;
     if (i >= drill::Probe::kTipFacets) meeting.rubbing_mm2 += area;
-    Sum& sum = sums[groupOf(i, facet)];
+    Sum& sum = sums[stretchOf(i) * kDirections + eighth_[i % drill::Probe::kTipFacets]];
     sum.x += area * facet.out_x, sum.y += area * facet.out_y;
     sum.behind -= area * facet.z_mm, sum.area += area;
   }

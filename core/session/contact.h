@@ -32,13 +32,11 @@ class Contact {
   static constexpr std::size_t kDirections = 8, kStretches = 4;
   static_assert(kDirections * kStretches == haptics::kMostSides);
 
-  /// The group of sides that a facet belongs to.
-  [[nodiscard]] std::size_t groupOf(std::size_t i, const drill::Facet& facet) const;
-
   double spacing_mm_;
   drill::BitShape shape_;
   drill::Probe probe_;
-  double cone_mm_, shaft_mm_;
+  std::array<std::uint8_t, drill::Probe::kTipFacets>
+      eighth_{};  ///< that a facet looks into; the tip's, then the shaft's
 };
 
 }  // namespace spinaltap::session

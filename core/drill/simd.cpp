@@ -1,14 +1,16 @@
-// All of core/drill that is compiled for each vector width: simd_clearance.h and simd_hand_out.h. One file, since
-// foreach_target.h can be included only once where all sources are one (tests/determinism).
-#include "core/drill/simd_clearance.h"
-
+// All of core/drill that is compiled for each vector width: simd_clearance.h, simd_hand_out.h and simd_probe.h. One
+// file, since foreach_target.h can be included only once where all sources are one (tests/determinism).
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
+#include "core/base/dmath.h"
+#include "core/drill/simd_clearance.h"
 #include "core/drill/simd_hand_out.h"
+#include "core/drill/simd_probe.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "core/drill/simd_clearance.cpp"
+#define HWY_TARGET_INCLUDE "core/drill/simd.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -31,15 +33,21 @@ HWY_INLINE X Series(Tag d, X x, const float (&terms)[kTerms]) {
   return sum;
 }
 
-/// Of (x, y) in turns, 0 .. 1. Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.49 (error 2e-8 rad).
+// Over t and its odd powers, t in 0 .. 1, from the highest down. Abramowitz and Stegun, Handbook of Mathematical
+// Functions, 4.4.49 (error 2e-8 rad).
+constexpr double kArctangent[] = {0.0028662257, -0.0161657367, 0.0429096138, -0.0752896400, 0.1065626393, -0.1420889944,
+                                  0.1999355085, -0.3333314528, 1.0};
+
+/// Of (x, y) in turns, 0 .. 1.
 HWY_INLINE V Turn(V x, V y) {
   const D d;
   const V a = hn::Abs(x), b = hn::Abs(y), one = hn::Set(d, 1.0F), zero = hn::Zero(d);
   const V t = hn::Div(hn::Min(a, b), hn::Max(hn::Max(a, b), hn::Set(d, 1e-30F)));
-  constexpr float kTerms[] = {0.0028662257F,  -0.0161657367F, 0.0429096138F,
-                              -0.0752896400F, 0.1065626393F,  -0.1420889944F,
-                              0.1999355085F,  -0.3333314528F, 1.0F};
-  const V acute = hn::Mul(hn::Mul(Series(d, hn::Mul(t, t), kTerms), t), hn::Set(d, 0.159154943F));
+  const V q = hn::Mul(t, t);
+  V series = hn::Set(d, static_cast<float>(kArctangent[0]));
+  for (std::size_t n = 1; n < std::size(kArctangent); ++n)
+    series = hn::Add(hn::Mul(series, q), hn::Set(d, static_cast<float>(kArctangent[n])));
+  const V acute = hn::Mul(hn::Mul(series, t), hn::Set(d, 0.159154943F));
   const V in_quarter = hn::IfThenElse(hn::Gt(b, a), hn::Sub(hn::Set(d, 0.25F), acute), acute);
   const V in_half = hn::IfThenElse(hn::Lt(x, zero), hn::Sub(hn::Set(d, 0.5F), in_quarter), in_quarter);
   return hn::IfThenElse(hn::Lt(y, zero), hn::Sub(one, in_half), in_half);
@@ -233,6 +241,44 @@ std::uint32_t HandOutRow(std::uint32_t count, std::uint32_t first, const std::ui
   return hn::GetLane(hn::SumOfLanes(DU(), Row(count, first, density, to)));
 }
 
+// A plain loop, that compilers turn into vectors of each width: WebAssembly has them for doubles, but Highway none.
+
+/// As Turn above, of doubles and without a branch.
+HWY_INLINE double TurnOf(double x, double y) {
+  const double a = x < 0 ? -x : x, b = y < 0 ? -y : y;
+  const double shorter = a < b ? a : b, longer = a < b ? b : a;
+  const double t = shorter / (longer > 1e-30 ? longer : 1e-30), q = t * t;
+  double series = kArctangent[0];
+  for (std::size_t n = 1; n < std::size(kArctangent); ++n) series = series * q + kArctangent[n];
+  const double acute = series * t * (0.5 / kPi);
+  const double in_quarter = b > a ? 0.25 - acute : acute;
+  const double in_half = x < 0 ? 0.5 - in_quarter : in_quarter;
+  return y < 0 ? 1.0 - in_half : in_half;
+}
+
+void NearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, const Places& places, std::size_t count,
+                   std::uint32_t* HWY_RESTRICT nearest) {
+  const double per_mm = 1.0 / lattice.spacing_mm, first = lattice.first_disc;
+  const double discs = lattice.discs, rings = lattice.rings;
+  const int per_disc = static_cast<int>(lattice.pointsPerDisc());
+  const double* HWY_RESTRICT across_x = places.x_mm;
+  const double* HWY_RESTRICT across_y = places.y_mm;
+  const double* HWY_RESTRICT along = places.z_mm;
+  const ToolFrame t = tool;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = t.tip_mm.x + (t.x.x * across_x[i] + t.y.x * across_y[i]) + t.z.x * along[i];
+    const double y = t.tip_mm.y + (t.x.y * across_x[i] + t.y.y * across_y[i]) + t.z.y * along[i];
+    const double z = t.tip_mm.z + (t.x.z * across_x[i] + t.y.z * across_y[i]) + t.z.z * along[i];
+    // Above zero a cast is the floor.
+    const double at = z * per_mm - first + 0.5, out = std::sqrt(x * x + y * y) * per_mm + 0.5;
+    const int inside = static_cast<int>(at >= 0) & static_cast<int>(at < discs) & static_cast<int>(out < rings);
+    const int disc = static_cast<int>(inside != 0 ? at : 0.0), ring = static_cast<int>(inside != 0 ? out : 0.0);
+    const int slots = ring == 0 ? 1 : 6 * ring, start = ring == 0 ? 0 : 3 * ring * (ring - 1) + 1;
+    const int past = static_cast<int>(TurnOf(x, y) * slots + 0.5), slot = past < slots ? past : past - slots;
+    nearest[i] = inside != 0 ? static_cast<std::uint32_t>(disc * per_disc + start + slot) : kNoPoint;
+  }
+}
+
 }  // namespace spinaltap::drill::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -257,6 +303,13 @@ HandedOut handOut(std::uint64_t bits, std::uint32_t first, const std::uint16_t* 
 }
 std::uint32_t handOutRow(std::uint32_t count, std::uint32_t first, const std::uint16_t* density, std::uint32_t* to) {
   return HWY_DYNAMIC_DISPATCH(HandOutRow)(count, first, density, to);
+}
+
+HWY_EXPORT(NearestPoints);
+
+void nearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, const Places& places, std::size_t count,
+                   std::uint32_t* nearest) {
+  HWY_DYNAMIC_DISPATCH(NearestPoints)(lattice, tool, places, count, nearest);
 }
 
 }  // namespace spinaltap::drill
