@@ -8,7 +8,7 @@
 
 #include "core/base/random.h"
 #include "core/haptics/port.h"
-#include "core/session/session.h"
+#include "core/session/told_model.h"
 
 namespace spinaltap::tradeoff {
 namespace {
@@ -181,12 +181,14 @@ class Loop {
         continue;
       }
       depth_mm_ = output.depth_mm;
-      back_.send(now_s, {pose->seq, haptics::fromTool(output.bit.axis, output.force_N), session_.localModel()}, lost_);
+      back_.send(now_s, {pose->seq, haptics::fromTool(output.bit.axis, output.force_N), told_.of(session_, output.bit)},
+                 lost_);
     }
   }
 
   const HapticCase& case_;
   session::Session session_;
+  session::ToldModel told_;
   haptics::Hand hand_;
   haptics::Port port_;
   Line<Pose> there_;

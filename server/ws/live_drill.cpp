@@ -6,6 +6,7 @@
 
 #include "core/haptics/proxy.h"
 #include "core/plan/path.h"
+#include "core/session/told_model.h"
 #include "server/jobs/drill_job.h"
 
 namespace spinaltap::ws {
@@ -54,6 +55,7 @@ struct LiveDrill::State {
   std::optional<std::uint32_t> next_seq = std::nullopt;
   std::uint64_t hash_due = 0;               ///< the cycle at or past which the next hash is sent
   std::vector<std::uint32_t> removed = {};  ///< by the last pose
+  session::ToldModel told = {};
 
   void answer(const session::Input& input, const session::Output& output, wire::Feedback& feedback);
   void measure(const session::Input& input, const session::Output& output);
@@ -157,7 +159,7 @@ Result<void> LiveDrill::drill(const wire::Poses& batch, std::size_t from, std::s
   }
   // The answer goes out now. Who holds the bit rigidly moves no bit of its own through the model.
   const bool wanted = to == batch.poses.size() && state.session.config().coupling.has_value();
-  if (wanted) feedback.local = state.session.localModel();
+  if (wanted) feedback.local = state.told.of(state.session, {feedback.tip_mm, feedback.axis});
   return {};
 }
 
