@@ -12,9 +12,11 @@ namespace {
 constexpr int kMostSteps = 24;         // of a period: through all that is told, and as much again before it
 constexpr double kShortest_mm = 0.01;  // of a step
 constexpr double kOpen_mm = 5;         // of one where nothing is told
+constexpr double kBehind_mm = 0.05;    // facets look a spacing ahead, so a bit behind by less meets what this one met
 
 /// How far a bit may go in one step, so that it comes past no depth that is told without being asked there.
 double stepFrom_mm(double ahead_mm) {
+  if (ahead_mm < -kBehind_mm - 1e-9) return std::max(kShortest_mm, -kBehind_mm - ahead_mm);
   for (std::size_t i = 0; i < kDepthsAhead; ++i) {
     const double half = i == 0 ? 0.0 : 0.5 * (kAhead_mm[i - 1] + kAhead_mm[i]);  // where a wall may begin
     for (const double depth : {half, kAhead_mm[i]}) {
@@ -61,7 +63,7 @@ Meeting meetingOf(const LocalModel& model, double ahead_mm, bool spinning) {
   const double part = spinning ? between : between < 0.5 ? 0.0 : 1.0;
   const double from = model.frontal_mm2[i - 1], to = model.frontal_mm2[i];
   // Behind where the server's bit stood there is a hole.
-  meeting.frontal_mm2 = ahead_mm < 0 ? 0.0 : from + part * (to - from);
+  meeting.frontal_mm2 = ahead_mm < -kBehind_mm ? 0.0 : from + part * (to - from);
   meeting.rubbing_mm2 = model.rubbing_mm2;
   for (std::size_t n = 0; n < kLocalSides; ++n) {
     if (!(model.side_mm2[n] > 0)) continue;

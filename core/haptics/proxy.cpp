@@ -164,6 +164,11 @@ double stiffestCoupling_N_mm(double device_damping_N_s_mm, double period_s, doub
   return std::max(0.0, 2.0 * (device_damping_N_s_mm - std::abs(damping_N_s_mm)) / period_s);
 }
 
+double boundedStiffness_N_mm(double wanted_N_mm, double device_damping_N_s_mm, double period_s, double damping_N_s_mm) {
+  return std::min(wanted_N_mm,
+                  kCouplingMargin * stiffestCoupling_N_mm(device_damping_N_s_mm, period_s, damping_N_s_mm));
+}
+
 // The rotation that takes z to the axis by the shortest way; beyond a right angle, the one that takes -z there.
 Vec3 toolX(const Vec3& axis) {
   const double sign = axis.z < 0 ? -1.0 : 1.0, per = 1.0 / (1.0 + sign * axis.z);

@@ -34,6 +34,9 @@ struct Coupling {
 /// 14, 1997), solved for K; 0 when the damping alone is too much.
 /// @param device_damping_N_s_mm b: of the device itself; period_s T: of its loop.
 [[nodiscard]] double stiffestCoupling_N_mm(double device_damping_N_s_mm, double period_s, double damping_N_s_mm);
+/// The stiffness to use: as wanted, or kCouplingMargin of the stiffest where that is less.
+[[nodiscard]] double boundedStiffness_N_mm(double wanted_N_mm, double device_damping_N_s_mm, double period_s,
+                                           double damping_N_s_mm);
 
 /// Across the axis, some of the bit's side that meets bone.
 struct SideContact {

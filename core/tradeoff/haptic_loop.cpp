@@ -251,6 +251,14 @@ std::string_view nameOf(Bone bone) {
   constexpr std::array<std::string_view, 3> kNames{"cortex", "cancellous", "through the wall"};
   return kNames[static_cast<std::size_t>(bone)];
 }
+
+haptics::Coupling couplingOf(Holding holding, double rate_hz) {
+  haptics::Coupling coupling;
+  coupling.stiffness_N_mm = haptics::boundedStiffness_N_mm(coupling.stiffness_N_mm, gripOf(holding).damping_N_s_mm,
+                                                           1 / rate_hz, coupling.damping_N_s_mm);
+  return coupling;
+}
+
 Result<Course> idealCourse(const HapticCase& haptic_case) {
   const HapticCase ideal_case = idealOf(haptic_case);
   auto loop = loopOf(ideal_case);

@@ -44,6 +44,9 @@ struct HapticResult {
   std::uint64_t late = 0, lost = 0;  ///< poses that the session refused because newer ones had come; lost on the way
 };
 
+/// What a hand drills with at a rate: the default, or what its damping can hold.
+[[nodiscard]] haptics::Coupling couplingOf(Holding holding, double rate_hz);
+
 /// The hand's course in one case, at 1 kHz, for plots: t_s, depth_mm, force_N.
 struct HapticTrace {
   std::vector<double> t_s, depth_mm, force_N;

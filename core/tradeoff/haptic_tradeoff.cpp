@@ -89,10 +89,23 @@ Result<std::vector<HapticMeasured>> measureHaptics(const HapticGrid& grid, const
   const std::size_t hands = kBones.size() * kHoldings.size();
   const auto settingOf = [&](std::size_t hand, HapticCase setting) {
     setting.bone = kBones[hand / kHoldings.size()], setting.holding = kHoldings[hand % kHoldings.size()];
+    setting.coupling = couplingOf(setting.holding, setting.rate_hz);
     return setting;
   };
-  const auto ideals = measured<Course>(
-      hands, grid.threads, [&](std::size_t hand) { return idealCourse(settingOf(hand, settings.front())); });
+  // Of each hand one a coupling, which several rates may share.
+  std::vector<HapticCase> ideal_cases;
+  const auto idealOf = [&](const HapticCase& setting) {
+    return std::find_if(ideal_cases.begin(), ideal_cases.end(), [&](const HapticCase& c) {
+      return c.bone == setting.bone && c.holding == setting.holding && c.coupling == setting.coupling;
+    });
+  };
+  for (std::size_t hand = 0; hand < hands; ++hand) {
+    for (const HapticCase& setting : settings) {
+      if (idealOf(settingOf(hand, setting)) == ideal_cases.end()) ideal_cases.push_back(settingOf(hand, setting));
+    }
+  }
+  const auto ideals =
+      measured<Course>(ideal_cases.size(), grid.threads, [&](std::size_t n) { return idealCourse(ideal_cases[n]); });
   if (!ideals) return tl::unexpected(ideals.error());
 
   std::vector<HapticMeasured> rows;
@@ -102,7 +115,8 @@ Result<std::vector<HapticMeasured>> measureHaptics(const HapticGrid& grid, const
     const auto of_hand =
         measured<HapticMeasured>(settings.size(), grid.threads, [&](std::size_t n) -> Result<HapticMeasured> {
           const HapticCase setting = settingOf(hand, settings[n]);
-          const auto result = runLoop(setting, (*ideals)[hand]);
+          const auto ideal = static_cast<std::size_t>(idealOf(setting) - ideal_cases.begin());
+          const auto result = runLoop(setting, (*ideals)[ideal]);
           if (!result) return tl::unexpected(result.error());
           return HapticMeasured{setting, *result};
         });

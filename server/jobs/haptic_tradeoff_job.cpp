@@ -38,6 +38,7 @@ Figures rowOf(const HapticMeasured& m) {
   Figures row{{"bone", std::string(tradeoff::nameOf(m.setting.bone))},
               {"holding", std::string(haptics::nameOf(m.setting.holding))}};
   row.update(settingOf(m.setting));
+  row["coupling_N_mm"] = shortened(m.setting.coupling.stiffness_N_mm);
   const tradeoff::HapticResult& r = m.result;
   row.update(Figures{{"force_mean_N", shortened(r.force_mean_N)},
                      {"force_rms_N", shortened(r.force_rms_N)},
@@ -154,20 +155,19 @@ std::string adviceOnStiffness(const Figures& figures) {
     if (isSteady(line) && (telling == nullptr || away(line) <= away(*telling))) telling = &line;
   }
   const auto text = [&](const char* key) { return shortNumber(number(*telling, key)); };
-  std::vector<std::string> too_slow;
+  std::vector<std::string> softer;
   for (const Figures& rate : figures["rates_hz"]) {
-    const double bound =
-        haptics::stiffestCoupling_N_mm(haptics::relaxedGrip().damping_N_s_mm, 1 / rate.get<double>(), 0);
-    if (bound < haptics::kStiffness_N_mm) too_slow.push_back(shortNumber(rate.get<double>()) + " Hz");
+    const double used = tradeoff::couplingOf(tradeoff::Holding::Relaxed, rate.get<double>()).stiffness_N_mm;
+    if (used < haptics::kStiffness_N_mm)
+      softer.push_back(shortNumber(used) + " at " + shortNumber(rate.get<double>()) + " Hz");
   }
   return "At " + text("rate_hz") + " Hz and " + text("delay_ms") + " ms a relaxed hand can hold a wall of " +
          text("answered_bare_N_mm") + " N/mm as answered and " + text("extrapolated_bare_N_mm") +
          " extrapolated; with the guard " + text("answered_guarded_N_mm") + " and " +
          text("extrapolated_guarded_N_mm") + ". Theory gives a wall without delay " + text("theory_N_mm") + "." +
-         (too_slow.empty() ? ""
-                           : " The coupling of " + shortNumber(haptics::kStiffness_N_mm) +
-                                 " N/mm that hands drill with here is stiffer than theory allows them at " +
-                                 joined(too_slow) + ": a device of that rate wants a softer one.");
+         " Hands drill with " + shortNumber(haptics::kStiffness_N_mm) + " N/mm, or with " +
+         shortNumber(haptics::kCouplingMargin) + " of what theory allows where that is less" +
+         (softer.empty() ? "." : ": a relaxed one with " + joined(softer) + ".");
 }
 
 /// Cases that differ by the network alone, and the most energy that one of them made.

@@ -31,9 +31,8 @@ std::optional<haptics::Coupling> couplingFor(const wire::Hello& hello) {
   if (hello.max_stiffness_N_mm > 0)
     coupling.stiffness_N_mm = std::min(coupling.stiffness_N_mm, hello.max_stiffness_N_mm);
   if (hello.damping_N_s_mm > 0 && hello.device_rate_hz > 0) {
-    const double stiffest =
-        haptics::stiffestCoupling_N_mm(hello.damping_N_s_mm, 1.0 / hello.device_rate_hz, coupling.damping_N_s_mm);
-    coupling.stiffness_N_mm = std::min(coupling.stiffness_N_mm, stiffest);
+    coupling.stiffness_N_mm = haptics::boundedStiffness_N_mm(coupling.stiffness_N_mm, hello.damping_N_s_mm,
+                                                             1.0 / hello.device_rate_hz, coupling.damping_N_s_mm);
   }
   coupling.stiffness_N_mm = std::max(coupling.stiffness_N_mm, kLeastStiffness_N_mm);
   return coupling;

@@ -43,7 +43,13 @@ TEST(LocalModel, KeepsWhatSidesAndTipMeet) {
 
 TEST(LocalModel, TellsWhatIsAheadByStraightLinesAndAStoppedBitByTheNearerDepth) {
   const LocalModel model = wallAt({}, 0.0);
-  EXPECT_EQ(meetingOf(model, -0.01, true).frontal_mm2, 0) << "behind the bit is its hole";
+  const LocalModel cutting = [] {
+    LocalModel m = wallAt({}, 0.0);
+    m.frontal_mm2[0] = 0.5F;
+    return m;
+  }();
+  EXPECT_EQ(meetingOf(cutting, -0.06, true).frontal_mm2, 0) << "behind the bit is its hole";
+  EXPECT_EQ(meetingOf(cutting, -0.04, true).frontal_mm2, 0.5) << "but its facets look a spacing ahead";
   EXPECT_NEAR(meetingOf(model, 0.125, true).frontal_mm2, 0.1, 1e-7);
   EXPECT_NEAR(meetingOf(model, 0.75, true).frontal_mm2, 0.35, 1e-7);
   EXPECT_NEAR(meetingOf(model, 9, true).frontal_mm2, 0.5, 1e-7) << "beyond, as at the last";

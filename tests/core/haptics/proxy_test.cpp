@@ -223,6 +223,8 @@ TEST(Coupling, KeepsToTheBoundOfColgateAndSchenkel) {
   EXPECT_DOUBLE_EQ(stiffestCoupling_N_mm(0.005, 0.001, 0.002), 6);
   EXPECT_DOUBLE_EQ(stiffestCoupling_N_mm(0.005, 0.001, -0.002), 6);
   EXPECT_EQ(stiffestCoupling_N_mm(0.005, 0.001, 0.006), 0);
+  EXPECT_DOUBLE_EQ(boundedStiffness_N_mm(100, 0.005, 0.001, 0.002), 4.5);
+  EXPECT_EQ(boundedStiffness_N_mm(4, 0.005, 0.001, 0.002), 4);
 }
 
 }  // namespace

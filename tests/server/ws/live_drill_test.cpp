@@ -18,7 +18,7 @@ TEST(Device, ACouplingIsAsStiffAsAskedForByDefaultAndAsTheDeviceCanHold) {
   hello.max_stiffness_N_mm = 2;
   EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, 2);
   hello.damping_N_s_mm = 0.0005, hello.device_rate_hz = 1000;
-  EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, haptics::stiffestCoupling_N_mm(0.0005, 0.001, 0));
+  EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, 0.75 * 2 * 0.0005 / 0.001);
   hello.damping_N_s_mm = 0;
   EXPECT_EQ(couplingFor(hello)->stiffness_N_mm, 2) << "of a device that does not say";
   hello.max_stiffness_N_mm = 1e-300;
