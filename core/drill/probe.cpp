@@ -55,17 +55,29 @@ double Probe::clearOfLattice_mm(const BitPose& pose) const {
   return std::max(0.0, norm(pose.tip_mm - middle_mm_) - near_mm_);
 }
 
+// As facet(), in loops that compilers turn into vectors. Kept in memory they would take as much as all else that a
+// session has beside its volume and its engine.
+void Probe::place(Places& x_mm, Places& y_mm, Places& z_mm) const {
+  for (int i = 0; i < static_cast<int>(kTipFacets); ++i) {
+    const double across = radius_mm_ * std::sqrt((i + 0.5) / kTipFacets), out = across + out_across_mm_;
+    x_mm[i] = out_x_[i] * out, y_mm[i] = out_y_[i] * out;
+    z_mm[i] = out_ahead_mm_ - across * cone_mm_ / radius_mm_;
+  }
+  for (int i = 0; i < static_cast<int>(kShaftFacets); ++i) {
+    const std::size_t at = kTipFacets + static_cast<std::size_t>(i);
+    x_mm[at] = out_x_[i] * (radius_mm_ + out_mm_), y_mm[at] = out_y_[i] * (radius_mm_ + out_mm_);
+    z_mm[at] = -cone_mm_ - shaft_mm_ * ((i + 0.5) / kShaftFacets);
+  }
+}
+
 // A place is at most half a spacing from its disc and half a spacing from its ring; on ring 1, whose slots are widest,
 // half a spacing outward and half a slot on, that is sqrt(1.5^2 + 1 - 3 cos 30) = 0.81 spacings in the disc's plane and
 // 0.95 in all. Slots near a boundary may be told apart wrongly by 4e-9 turns, which is less than what 0.95 was rounded.
 void Probe::look(const point_volume::PointVolume& volume, const BitPose& pose, const Vec3& x, const Vec3& y,
                  std::span<std::uint16_t> densities) const {
   const std::size_t looks = std::min(count(), densities.size());
-  std::array<double, kMostFacets> x_mm, y_mm, z_mm;
-  for (std::size_t i = 0; i < looks; ++i) {
-    const Facet at = facet(i);
-    x_mm[i] = at.out_x * at.across_mm, y_mm[i] = at.out_y * at.across_mm, z_mm[i] = at.z_mm;
-  }
+  Places x_mm, y_mm, z_mm;
+  place(x_mm, y_mm, z_mm);
   std::array<std::uint32_t, kMostFacets> nearest;
   nearestPoints(volume.lattice, {pose.tip_mm, x, y, pose.axis}, {x_mm.data(), y_mm.data(), z_mm.data()}, looks,
                 nearest.data());

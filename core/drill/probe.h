@@ -51,6 +51,10 @@ class Probe {
   [[nodiscard]] double clearOfLattice_mm(const BitPose& pose) const;
 
  private:
+  using Places = std::array<double, kMostFacets>;
+  /// Every facet's place, tool frame.
+  void place(Places& x_mm, Places& y_mm, Places& z_mm) const;
+
   std::array<float, kTipFacets> out_x_, out_y_;  ///< of the tip's facets, and again of the shaft's
   double radius_mm_, cone_mm_, shaft_mm_, out_mm_;
   double out_across_mm_ = 0, out_ahead_mm_ = 0;  ///< of the way out along the cone's normal

@@ -256,8 +256,8 @@ HWY_INLINE double TurnOf(double x, double y) {
   return y < 0 ? 1.0 - in_half : in_half;
 }
 
-void NearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, const Places& places, std::size_t count,
-                   std::uint32_t* HWY_RESTRICT nearest) {
+void NearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, const PlaceArrays& places,
+                   std::size_t count, std::uint32_t* HWY_RESTRICT nearest) {
   const double per_mm = 1.0 / lattice.spacing_mm, first = lattice.first_disc;
   const double discs = lattice.discs, rings = lattice.rings;
   const int per_disc = static_cast<int>(lattice.pointsPerDisc());
@@ -307,8 +307,8 @@ std::uint32_t handOutRow(std::uint32_t count, std::uint32_t first, const std::ui
 
 HWY_EXPORT(NearestPoints);
 
-void nearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, const Places& places, std::size_t count,
-                   std::uint32_t* nearest) {
+void nearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, const PlaceArrays& places,
+                   std::size_t count, std::uint32_t* nearest) {
   HWY_DYNAMIC_DISPATCH(NearestPoints)(lattice, tool, places, count, nearest);
 }
 

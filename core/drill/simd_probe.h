@@ -9,7 +9,7 @@
 namespace spinaltap::drill {
 
 /// Places in the tool's frame, an array each.
-struct Places {
+struct PlaceArrays {
   const double *x_mm, *y_mm, *z_mm;
 };
 /// The tool in the path frame.
@@ -22,7 +22,7 @@ inline constexpr std::uint32_t kNoPoint = 0xffffffff;
 /// The point nearest to each place by disc, then by ring, then by slot; kNoPoint outside the lattice. Slots that are
 /// equally near within 4e-9 turns may be told apart wrongly. The same bits on every target.
 /// @pre frame and places are finite; the lattice is valid.
-void nearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, const Places& places, std::size_t count,
-                   std::uint32_t* nearest);
+void nearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, const PlaceArrays& places,
+                   std::size_t count, std::uint32_t* nearest);
 
 }  // namespace spinaltap::drill
