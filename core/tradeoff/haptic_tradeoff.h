@@ -48,7 +48,8 @@ struct StiffestMeasured {
 using HapticProgress = std::function<void(double)>;
 
 /// By bone, holding, rate, network, and as answered before extrapolated; always with the guard and couplingOf.
-/// @error as checkGrid, session::Session::create. @cost 0.05 s of a thread a case and 0.5 s a bone, holding and coupling.
+/// @error as checkGrid, session::Session::create.
+/// @cost 0.05 s of a thread a case and 0.5 s a bone, holding and coupling.
 [[nodiscard]] Result<std::vector<HapticMeasured>> measureHaptics(const HapticGrid& grid,
                                                                  const HapticProgress& progress = {});
 
