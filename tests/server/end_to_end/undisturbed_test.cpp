@@ -39,7 +39,7 @@ TEST(Undisturbed, EveryPoseIsAnsweredWhileACaseIsImportedAndReconstructed) {
   load::LoadJob job;
   job.sessions = 4, job.rate_hz = 100, job.seconds = 3;
   load::Target target;
-  target.port = static_cast<std::uint16_t>(server.port());
+  target.server.port = static_cast<std::uint16_t>(server.port());
   target.case_id = small.case_id, target.path_id = small.path_id;
   job.target = target;
   const auto figures = load::run(job, {});
