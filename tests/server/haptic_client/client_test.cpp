@@ -245,7 +245,7 @@ TEST_F(HapticClient, KeepsToTheDevicesForceAndTellsHowOftenItWasLimited) {
   };
   setup.on_answer = [&](const Answered& answered) { told += answered.answer.feedback.limited ? 1 : 0; };
   const auto client = Client::start(setup, device).value();
-  EXPECT_DOUBLE_EQ(client->welcome().stiffness_N_mm, 2) << "b > K T / 2";
+  EXPECT_DOUBLE_EQ(client->welcome().stiffness_N_mm, 1.5) << "three quarters of 2 b / T";
   EXPECT_DOUBLE_EQ(client->welcome().force_scale, 2.0 / 40);
   ASSERT_TRUE(waitUntil([&] { return !client->isRunning(); }));
   const Tally tally = client->finish().value().tally;
