@@ -57,12 +57,13 @@ double Probe::clearOfLattice_mm(const BitPose& pose) const {
 
 // As facet(), in loops that compilers turn into vectors. Kept in memory they would take as much as all else that a
 // session has beside its volume and its engine.
-void Probe::place(Places& x_mm, Places& y_mm, Places& z_mm) const {
+void Probe::place(Places& x_mm, Places& y_mm, Places& z_mm, bool with_shaft) const {
   for (int i = 0; i < static_cast<int>(kTipFacets); ++i) {
     const double across = radius_mm_ * std::sqrt((i + 0.5) / kTipFacets), out = across + out_across_mm_;
     x_mm[i] = out_x_[i] * out, y_mm[i] = out_y_[i] * out;
     z_mm[i] = out_ahead_mm_ - across * cone_mm_ / radius_mm_;
   }
+  if (!with_shaft) return;
   for (int i = 0; i < static_cast<int>(kShaftFacets); ++i) {
     const std::size_t at = kTipFacets + static_cast<std::size_t>(i);
     x_mm[at] = out_x_[i] * (radius_mm_ + out_mm_), y_mm[at] = out_y_[i] * (radius_mm_ + out_mm_);
@@ -77,7 +78,7 @@ void Probe::look(const point_volume::PointVolume& volume, const BitPose& pose, c
                  std::span<std::uint16_t> densities) const {
   const std::size_t looks = std::min(count(), densities.size());
   Places x_mm, y_mm, z_mm;
-  place(x_mm, y_mm, z_mm);
+  place(x_mm, y_mm, z_mm, looks > kTipFacets);
   std::array<std::uint32_t, kMostFacets> nearest;
   nearestPoints(volume.lattice, {pose.tip_mm, x, y, pose.axis}, {x_mm.data(), y_mm.data(), z_mm.data()}, looks,
                 nearest.data());

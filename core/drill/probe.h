@@ -52,8 +52,8 @@ class Probe {
 
  private:
   using Places = std::array<double, kMostFacets>;
-  /// Every facet's place, tool frame.
-  void place(Places& x_mm, Places& y_mm, Places& z_mm) const;
+  /// The facets' places, tool frame.
+  void place(Places& x_mm, Places& y_mm, Places& z_mm, bool with_shaft) const;
 
   std::array<float, kTipFacets> out_x_, out_y_;  ///< of the tip's facets, and again of the shaft's
   double radius_mm_, cone_mm_, shaft_mm_, out_mm_;

@@ -26,7 +26,12 @@ double stepFrom_mm(double ahead_mm) {
   return kOpen_mm;
 }
 
-SinCos directionOf(std::size_t i) { return sinCosOfTurn(static_cast<int>(i), kLocalSides); }
+using Directions = std::array<SinCos, kLocalSides>;
+Directions directions() {
+  Directions directions;
+  for (std::size_t i = 0; i < kLocalSides; ++i) directions[i] = sinCosOfTurn(static_cast<int>(i), kLocalSides);
+  return directions;
+}
 
 }  // namespace
 
@@ -36,12 +41,13 @@ LocalModel localModel(const Rod& bit, const Meeting& meeting, const std::array<d
   for (std::size_t i = 0; i < kDepthsAhead; ++i) model.frontal_mm2[i] = static_cast<float>(frontal_mm2[i]);
   model.rubbing_mm2 = static_cast<float>(meeting.rubbing_mm2);
   std::array<double, kLocalSides> area{}, lever{};
+  const Directions directed = directions();
   for (std::size_t n = 0; n < meeting.side_count; ++n) {
     const SideContact& side = meeting.sides[n];
     std::size_t nearest = 0;
     double best = -2;
     for (std::size_t i = 0; i < kLocalSides; ++i) {
-      const SinCos at = directionOf(i);
+      const SinCos& at = directed[i];
       const double along = side.x * at.cos + side.y * at.sin;
       if (along > best) best = along, nearest = i;
     }
@@ -65,9 +71,10 @@ Meeting meetingOf(const LocalModel& model, double ahead_mm, bool spinning) {
   // Behind where the server's bit stood there is a hole.
   meeting.frontal_mm2 = ahead_mm < -kBehind_mm ? 0.0 : from + part * (to - from);
   meeting.rubbing_mm2 = model.rubbing_mm2;
+  const Directions directed = directions();
   for (std::size_t n = 0; n < kLocalSides; ++n) {
     if (!(model.side_mm2[n] > 0)) continue;
-    const SinCos direction = directionOf(n);
+    const SinCos& direction = directed[n];
     meeting.sides[meeting.side_count++] = {direction.cos, direction.sin, model.side_lever[n], model.side_mm2[n]};
   }
   return meeting;

@@ -7,10 +7,11 @@
 namespace spinaltap::session {
 
 /// The bone ahead costs more to look at than a cycle costs to drill, and what is met changes with the lattice's cells:
-/// it is looked up anew once a point of the bit has moved by kAnew spacings, and told from where the bit then stands.
+/// it is looked up anew once a point of the tip has moved by kAnew spacings, and told from where the bit then stands.
+/// The far end of a bit that turns moves farther, but told are only its sides, as a whole.
 class ToldModel {
  public:
-  static constexpr double kAnew = 0.1;
+  static constexpr double kAnew = 0.25;
 
   /// @param bit where the session's bit stands. @cost mostly nothing; else Session::localModel().
   [[nodiscard]] haptics::LocalModel of(const Session& session, const drill::BitPose& bit) {
@@ -24,7 +25,9 @@ class ToldModel {
 
  private:
   [[nodiscard]] double moved_mm(const Session& session, const drill::BitPose& bit) const {
-    return norm(bit.tip_mm - looked_from_.tip_mm) + session.config().bit.length_mm * norm(bit.axis - looked_from_.axis);
+    const plan::Bit& of = session.config().bit;
+    const double tip_mm = of.cone_length_mm + of.diameter_mm;
+    return norm(bit.tip_mm - looked_from_.tip_mm) + tip_mm * norm(bit.axis - looked_from_.axis);
   }
 
   std::optional<haptics::LocalModel> told_;
