@@ -11,7 +11,7 @@ namespace spinaltap::session {
 /// The far end of a bit that turns moves farther, but told are only its sides, as a whole.
 class ToldModel {
  public:
-  static constexpr double kAnew = 0.25;
+  static constexpr double kAnew = 0.1;
 
   /// @param bit where the session's bit stands. @cost mostly nothing; else Session::localModel().
   [[nodiscard]] haptics::LocalModel of(const Session& session, const drill::BitPose& bit) {

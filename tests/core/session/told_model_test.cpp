@@ -9,7 +9,7 @@ namespace {
 
 constexpr point_volume::Lattice kLattice{0.2, 20, 80, -10};
 
-TEST(ToldModel, IsAsOfABitWhoseTipWasAQuarterOfASpacingAwayAtMost) {
+TEST(ToldModel, IsAsOfABitWhoseTipWasATenthOfASpacingAwayAtMost) {
   Random random(63);
   point_volume::PointVolume volume = *point_volume::solidVolume(kLattice, 1);
   for (auto& density : volume.density_mg_cm3) density = static_cast<std::uint16_t>(100 + random.below(1500));
@@ -34,7 +34,7 @@ TEST(ToldModel, IsAsOfABitWhoseTipWasAQuarterOfASpacingAwayAtMost) {
     bool found = false;
     for (auto truth = truths.rbegin(); truth != truths.rend() && !found; ++truth) {
       const double far = norm(truth->first.tip_mm - output.bit.tip_mm) + 8 * norm(truth->first.axis - output.bit.axis);
-      found = far <= 0.25 * 0.2 && truth->second.frontal_mm2 == model.frontal_mm2 &&
+      found = far <= 0.1 * 0.2 && truth->second.frontal_mm2 == model.frontal_mm2 &&
               truth->second.side_mm2 == model.side_mm2;
     }
     ASSERT_TRUE(found) << i;
