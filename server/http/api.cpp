@@ -114,6 +114,9 @@ const std::vector<Api::Route>& Api::routes() {
       {"GET", "/api/v1/cases/{}/mesh.ply", &Api::sendPly},
       {"GET", "/api/v1/cases/{}/volume", &Api::sendVolume},
       {"POST", "/api/v1/cases/{}/paths", &Api::addPath},
+      {"GET", "/api/v1/cases/{}/paths/{}", &Api::showPath},
+      {"PUT", "/api/v1/cases/{}/paths/{}", &Api::replacePath},
+      {"DELETE", "/api/v1/cases/{}/paths/{}", &Api::removePath},
       {"GET", "/api/v1/cases/{}/paths/{}/point-volume", &Api::sendPointVolume},
       {"GET", "/api/v1/cases/{}/recordings", &Api::listRecordings},
       {"POST", "/api/v1/sessions", &Api::addSession},
@@ -128,7 +131,9 @@ bool Api::owns(const std::string& path) {
   return path.rfind("/api/", 0) == 0 || path == "/api" || path == "/healthz" || path == "/readyz";
 }
 
-bool Api::isHeavy(const Request& request) { return request.method == "POST" && request.path != "/api/v1/sessions"; }
+bool Api::isHeavy(const Request& request) {
+  return request.method == "PUT" || (request.method == "POST" && request.path != "/api/v1/sessions");
+}
 
 Response Api::handle(const Request& request) {
   const std::string method = request.method == "HEAD" ? "GET" : request.method;
@@ -234,21 +239,44 @@ Response Api::listRecordings(const Request&, const Parts& ids) {
   return jsonResponse({{"recordings", recordingsOf(*recordings)}});
 }
 
-Response Api::addPath(const Request& request, const Parts& ids) {
+tl::expected<store::Path, Response> Api::plan(const Request& request, const std::string& case_id,
+                                              const std::string& path_id) {
   const auto body = parseBody(request);
-  if (!body) return body.error();
+  if (!body) return tl::unexpected(body.error());
   jobs::PlanJob job;
   try {
     job = planJobOf(*body);
   } catch (const json::exception&) {
-    return problem(422, "the body needs entry_patient and target_patient, [x, y, z] in mm, and numbers elsewhere");
+    return tl::unexpected(
+        problem(422, "the body needs entry_patient and target_patient, [x, y, z] in mm, and numbers elsewhere"));
   }
-  job.case_id = ids[0];
-  const auto made = jobs::planPath(store_, job, {});
-  if (!made) return problemOf(made.error());
+  job.case_id = case_id, job.path_id = path_id;
+  auto made = jobs::planPath(store_, job, {});
+  if (!made) return tl::unexpected(problemOf(made.error()));
+  return std::move(*made);
+}
+
+Response Api::addPath(const Request& request, const Parts& ids) {
+  const auto made = plan(request, ids[0], "");
+  if (!made) return made.error();
   Response response = jsonResponse(jobs::describe(*made), 201);
-  response.headers.emplace_back("Location", "/api/v1/cases/" + made->case_id + "/paths/" + made->id + "/point-volume");
+  response.headers.emplace_back("Location", "/api/v1/cases/" + made->case_id + "/paths/" + made->id);
   return response;
+}
+
+Response Api::showPath(const Request&, const Parts& ids) {
+  const auto row = store_.findPath(ids[0], ids[1]);
+  return row ? jsonResponse(jobs::describe(*row)) : problemOf(row.error());
+}
+
+Response Api::replacePath(const Request& request, const Parts& ids) {
+  const auto made = plan(request, ids[0], ids[1]);
+  return made ? jsonResponse(jobs::describe(*made)) : made.error();
+}
+
+Response Api::removePath(const Request&, const Parts& ids) {
+  const auto row = store_.removePath(ids[0], ids[1]);
+  return row ? jsonResponse({{"id", row->id}, {"kept", row->drilled}}) : problemOf(row.error());
 }
 
 Response Api::addSession(const Request& request, const Parts&) {
@@ -260,7 +288,7 @@ Response Api::addSession(const Request& request, const Parts&) {
   } catch (const json::exception&) {
     return problem(422, "the body needs case_id and path_id, both text");
   }
-  const auto path = store_.findPath(ticket.case_id, ticket.path_id);
+  const auto path = store_.findPathToDrill(ticket.case_id, ticket.path_id);
   if (!path) return problemOf(path.error());
   const auto id = waiting_.add(ticket);
   if (!id) return problem(503, id.error().message);

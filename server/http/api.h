@@ -38,11 +38,16 @@ class Api {
   Response sendVolume(const Request&, const Parts& ids);
   Response sendPointVolume(const Request&, const Parts& ids);
   Response addPath(const Request&, const Parts& ids);
+  Response showPath(const Request&, const Parts& ids);
+  Response replacePath(const Request&, const Parts& ids);
+  Response removePath(const Request&, const Parts& ids);
   Response addSession(const Request&, const Parts&);
   Response listRecordings(const Request&, const Parts& ids);
   Response sendRecording(const Request&, const Parts& ids);
   Response health(const Request&, const Parts&);
   Response ready(const Request&, const Parts&);
+  tl::expected<store::Path, Response> plan(const Request& request, const std::string& case_id,
+                                           const std::string& path_id);
   Response sendMeshFile(const Request& request, const std::string& case_id, mesh_out::Format format);
   Response sendBlob(const Request& request, const store::BlobId& id, const std::string& missing);
 

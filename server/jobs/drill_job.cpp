@@ -144,7 +144,7 @@ Figures figuresOf(const metrics::Metrics& metrics) {
 Result<DrillSite> siteOfPath(store::Store& store, const std::string& case_id, const std::string& path_id) {
   const auto row = store.findCase(case_id);
   if (!row) return tl::unexpected(row.error());
-  const auto path = store.findPath(case_id, path_id);
+  const auto path = store.findPathToDrill(case_id, path_id);
   if (!path) return tl::unexpected(path.error());
   auto volume = loadPointVolume(store, *path);
   if (!volume) return tl::unexpected(volume.error());

@@ -24,7 +24,7 @@ struct DrillSite {
   std::string case_id, path_id;  ///< empty for the scene volume
 };
 
-/// @error NotFound, Corrupt, Io.
+/// From now on the path stays as it is (store::Store::findPathToDrill). @error NotFound, Corrupt, Io.
 [[nodiscard]] Result<DrillSite> siteOfPath(store::Store& store, const std::string& case_id, const std::string& path_id);
 /// The report's volume, all bone. @error never, but for a broken lattice.
 [[nodiscard]] Result<DrillSite> siteOfReport();

@@ -41,6 +41,9 @@ Result<store::Path> planPath(store::Store& store, const PlanJob& job, const Prog
   if (const auto checked = plan::checkPath(job.path); !checked) return tl::unexpected(checked.error());
   const auto row = store.findCase(job.case_id);
   if (!row) return tl::unexpected(row.error());
+  if (!job.path_id.empty()) {
+    if (const auto old = store.findPath(job.case_id, job.path_id); !old) return old;
+  }
   const point_volume::Lattice lattice = point_volume::latticeOf(job.path);
   if (lattice.points() > kMostPoints) {
     return fail(ErrorCode::Limit, "path: " + std::to_string(lattice.points()) + " points, over the limit of " +
@@ -52,9 +55,15 @@ Result<store::Path> planPath(store::Store& store, const PlanJob& job, const Prog
   const std::uint64_t alive = point_volume::countAlive(*points);
   if (alive == 0) return fail(ErrorCode::Degenerate, "path: there is no bone along it");
   if (progress) progress("keep", 0.9);
-  const auto blob = store.blobs().put(wire::encodePointVolume(*points), store::Gzip::Sibling);
+  const std::vector<std::byte> bytes = wire::encodePointVolume(*points);
+  const auto blob = store.blobs().put(bytes, store::Gzip::Sibling);
   if (!blob) return tl::unexpected(blob.error());
-  return store.addPath({"", row->id, job.label, "", job.path, lattice, alive, *blob});
+  store::Path wanted{job.path_id, row->id, job.label, "", job.path, lattice, alive, *blob};
+  auto kept = job.path_id.empty() ? store.addPath(std::move(wanted)) : store.replacePath(std::move(wanted));
+  if (!kept) return kept;
+  // Points that were there already may have been dropped with the last path that named them, before this one did.
+  if (const auto again = store.blobs().put(bytes, store::Gzip::Sibling); !again) return tl::unexpected(again.error());
+  return kept;
 }
 
 Figures describe(const store::Path& row) {
@@ -76,7 +85,9 @@ Figures describe(const store::Path& row) {
             {"axes", {toJson(frame.axes.col_x), toJson(frame.axes.col_y), toJson(frame.axes.col_z)}}}},
           {"lattice", toJson(row.lattice)},
           {"points", row.lattice.points()},
-          {"points_alive", row.points_alive}};
+          {"points_alive", row.points_alive},
+          {"retired", row.retired},
+          {"replaced_by", row.replaced_by}};
 }
 
 }  // namespace spinaltap::jobs

@@ -16,14 +16,15 @@ inline constexpr std::uint64_t kMostPoints = 32'000'000;
 struct PlanJob {
   std::string case_id, label;
   plan::Path path;
+  std::string path_id = {};  ///< of the path whose place it takes, see store::Store::replacePath; empty: a new one
 };
 
-/// @error NotFound (no such case, not reconstructed), Limit (kMostPoints), Degenerate (no bone along the path), and
-///        those of plan::checkPath.
+/// @error NotFound (no such case or path, not reconstructed), Limit (kMostPoints), Degenerate (no bone along the
+///        path), and those of plan::checkPath.
 [[nodiscard]] Result<store::Path> planPath(store::Store& store, const PlanJob& job, const Progress& progress);
 
 /// What the contract calls a Path: id, label, entry_patient, target_patient, bit, volume_radius_mm, lead_mm,
-/// spacing_mm, length_mm, frame, lattice, points, points_alive.
+/// spacing_mm, length_mm, frame, lattice, points, points_alive, retired, replaced_by.
 [[nodiscard]] Figures describe(const store::Path& path);
 
 }  // namespace spinaltap::jobs

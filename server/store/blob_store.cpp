@@ -152,6 +152,13 @@ Result<BlobId> BlobStore::adopt(const fs::path& from) {
   return id;
 }
 
+void BlobStore::remove(const BlobId& id) {
+  if (!isBlobId(id)) return;
+  std::error_code ignored;
+  fs::remove(place(id).string() + ".gz", ignored);
+  fs::remove(place(id), ignored);
+}
+
 Result<fs::path> BlobStore::file(const BlobId& id) const {
   std::error_code error;
   if (!isBlobId(id) || !fs::is_regular_file(place(id), error)) {

@@ -41,6 +41,9 @@ class BlobStore {
   /// @error NotFound, Io, Corrupt (the bytes no longer match the name).
   [[nodiscard]] Result<std::vector<std::byte>> get(const BlobId& id) const;
 
+  /// Also its sibling. A blob that is not there is no error.
+  void remove(const BlobId& id);
+
   /// Where the bytes are. @error NotFound.
   [[nodiscard]] Result<std::filesystem::path> file(const BlobId& id) const;
   /// The gzipped sibling's place; empty when there is none.

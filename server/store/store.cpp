@@ -100,7 +100,7 @@ void connect(soci::session& sql, const fs::path& file) {
 
 constexpr const char* kCaseColumns =
     "SELECT id, label, created, stage, grid, label_source, figures, ct, label_blob, roi, model, mesh,"
-    " (SELECT COUNT(*) FROM paths WHERE case_id = cases.id),"
+    " (SELECT COUNT(*) FROM paths WHERE case_id = cases.id AND retired = 0),"
     " (SELECT COUNT(*) FROM recordings WHERE case_id = cases.id) FROM cases ";
 
 std::vector<Case> selectCases(soci::session& sql, const std::string& where, const std::string& id) {
@@ -144,14 +144,18 @@ std::vector<Path> selectPaths(soci::session& sql, const std::string& where, cons
   Path row;
   std::string definition;
   long long alive = 0;
+  int drilled = 0, retired = 0;
   soci::statement query =
-      (sql.prepare << "SELECT id, case_id, label, created, definition, points_alive, point_volume FROM paths " + where,
+      (sql.prepare << "SELECT id, case_id, label, created, definition, points_alive, point_volume,"
+                      " drilled, retired, replaced_by FROM paths " +
+                          where,
        into(row.id), into(row.case_id), into(row.label), into(row.created), into(definition), into(alive),
-       into(row.point_volume), use(id, "id"));
+       into(row.point_volume), into(drilled), into(retired), into(row.replaced_by), use(id, "id"));
   std::vector<Path> rows;
   for (bool more = query.execute(true); more; more = query.fetch()) {
     readDefinition(json::parse(definition), row);
     row.points_alive = static_cast<std::uint64_t>(alive);
+    row.drilled = drilled != 0, row.retired = retired != 0;
     rows.push_back(row);
   }
   return rows;
@@ -174,6 +178,38 @@ std::vector<Recording> selectRecordings(soci::session& sql, const std::string& w
   return rows;
 }
 
+/// A new id, of today, in nobody's place.
+void insertPath(soci::session& sql, Path& wanted) {
+  wanted.id = randomId('p');
+  wanted.created = timestamp();
+  wanted.drilled = wanted.retired = false;
+  wanted.replaced_by.clear();
+  const std::string definition = definitionOf(wanted).dump();
+  const auto alive = static_cast<long long>(wanted.points_alive);
+  sql << "INSERT INTO paths (id, case_id, label, created, definition, points_alive, point_volume)"
+         " VALUES (:id, :case, :label, :created, :definition, :alive, :volume)",
+      use(wanted.id), use(wanted.case_id), use(wanted.label), use(wanted.created), use(definition), use(alive),
+      use(wanted.point_volume);
+}
+
+void retirePath(soci::session& sql, const std::string& id, const std::string& replaced_by) {
+  sql << "UPDATE paths SET retired = 1, replaced_by = :by WHERE id = :id", use(replaced_by), use(id);
+}
+
+/// All of `body` or nothing; other processes that write wait meanwhile.
+template <class F>
+auto inTransaction(soci::session& sql, F&& body) -> decltype(body()) {
+  sql << "BEGIN IMMEDIATE";
+  try {
+    auto result = body();
+    sql << (result ? "COMMIT" : "ROLLBACK");
+    return result;
+  } catch (...) {
+    sql << "ROLLBACK";
+    throw;
+  }
+}
+
 /// Shown in messages: never more of a caller's text than an id is long.
 std::string shown(const std::string& id) { return isId(id) ? id : "(not an id)"; }
 
@@ -181,6 +217,23 @@ template <class Row>
 Result<Row> only(std::vector<Row> rows, const char* kind, const std::string& id) {
   if (rows.empty()) return fail(ErrorCode::NotFound, std::string("there is no ") + kind + " " + shown(id));
   return std::move(rows.front());
+}
+
+Result<Path> pathOfCase(soci::session& sql, const std::string& case_id, const std::string& path_id) {
+  auto found = only(selectPaths(sql, "WHERE id = :id", path_id), "path", path_id);
+  if (found && found->case_id != case_id) {
+    return fail(ErrorCode::NotFound, "path " + shown(path_id) + " is not one of case " + shown(case_id));
+  }
+  return found;
+}
+
+Result<Path> plannedPath(soci::session& sql, const std::string& case_id, const std::string& path_id) {
+  auto found = pathOfCase(sql, case_id, path_id);
+  if (found && found->retired) {
+    return fail(ErrorCode::NotFound, "path " + path_id + " is no longer in the plan" +
+                                         (found->replaced_by.empty() ? "" : ": path " + found->replaced_by + " is"));
+  }
+  return found;
 }
 
 }  // namespace
@@ -282,13 +335,7 @@ Result<Path> Store::addPath(Path wanted) {
     if (selectCases(state_->sql, "WHERE id = :id", wanted.case_id).empty()) {
       return fail(ErrorCode::NotFound, "there is no case " + shown(wanted.case_id));
     }
-    wanted.id = randomId('p');
-    wanted.created = timestamp();
-    const std::string definition = definitionOf(wanted).dump();
-    const auto alive = static_cast<long long>(wanted.points_alive);
-    state_->sql << "INSERT INTO paths VALUES (:id, :case, :label, :created, :definition, :alive, :volume)",
-        use(wanted.id), use(wanted.case_id), use(wanted.label), use(wanted.created), use(definition), use(alive),
-        use(wanted.point_volume);
+    insertPath(state_->sql, wanted);
     return wanted;
   });
 }
@@ -296,18 +343,88 @@ Result<Path> Store::addPath(Path wanted) {
 Result<std::vector<Path>> Store::paths(const std::string& case_id) {
   const std::scoped_lock lock(state_->mutex);
   return guarded("listing paths", [&]() -> Result<std::vector<Path>> {
-    return selectPaths(state_->sql, "WHERE case_id = :id ORDER BY rowid", case_id);
+    return selectPaths(state_->sql, "WHERE case_id = :id AND retired = 0 ORDER BY rowid", case_id);
   });
 }
 
 Result<Path> Store::findPath(const std::string& case_id, const std::string& path_id) {
   const std::scoped_lock lock(state_->mutex);
-  return guarded("finding a path", [&]() -> Result<Path> {
-    auto found = only(selectPaths(state_->sql, "WHERE id = :id", path_id), "path", path_id);
-    if (found && found->case_id != case_id) {
-      return fail(ErrorCode::NotFound, "path " + shown(path_id) + " is not one of case " + shown(case_id));
-    }
-    return found;
+  return guarded("finding a path", [&] { return pathOfCase(state_->sql, case_id, path_id); });
+}
+
+Result<Path> Store::findPathToDrill(const std::string& case_id, const std::string& path_id) {
+  const std::scoped_lock lock(state_->mutex);
+  return guarded("finding a path to drill", [&] {
+    return inTransaction(state_->sql, [&]() -> Result<Path> {
+      auto found = pathOfCase(state_->sql, case_id, path_id);
+      if (!found || found->drilled) return found;
+      state_->sql << "UPDATE paths SET drilled = 1 WHERE id = :id", use(path_id);
+      found->drilled = true;
+      return found;
+    });
+  });
+}
+
+Result<Path> Store::replacePath(Path wanted) {
+  const std::scoped_lock lock(state_->mutex);
+  BlobId old_points;
+  auto replaced = guarded("replacing a path", [&] {
+    return inTransaction(state_->sql, [&]() -> Result<Path> {
+      const auto old = plannedPath(state_->sql, wanted.case_id, wanted.id);
+      if (!old) return old;
+      if (old->drilled) {
+        insertPath(state_->sql, wanted);
+        retirePath(state_->sql, old->id, wanted.id);
+        return wanted;
+      }
+      old_points = old->point_volume;
+      wanted.created = old->created;
+      const std::string definition = definitionOf(wanted).dump();
+      const auto alive = static_cast<long long>(wanted.points_alive);
+      state_->sql << "UPDATE paths SET label = :label, definition = :definition, points_alive = :alive,"
+                     " point_volume = :volume WHERE id = :id",
+          use(wanted.label), use(definition), use(alive), use(wanted.point_volume), use(wanted.id);
+      return wanted;
+    });
+  });
+  if (!replaced || old_points.empty()) return replaced;
+  if (const auto dropped = dropUnnamed(old_points); !dropped) return tl::unexpected(dropped.error());
+  return replaced;
+}
+
+Result<Path> Store::removePath(const std::string& case_id, const std::string& path_id) {
+  const std::scoped_lock lock(state_->mutex);
+  auto removed = guarded("removing a path", [&] {
+    return inTransaction(state_->sql, [&]() -> Result<Path> {
+      auto row = plannedPath(state_->sql, case_id, path_id);
+      if (!row) return row;
+      row->retired = true;
+      if (row->drilled) {
+        retirePath(state_->sql, path_id, "");
+      } else {
+        state_->sql << "DELETE FROM paths WHERE id = :id", use(path_id);
+      }
+      return row;
+    });
+  });
+  if (!removed || removed->drilled) return removed;
+  if (const auto dropped = dropUnnamed(removed->point_volume); !dropped) return tl::unexpected(dropped.error());
+  return removed;
+}
+
+/// In a transaction of its own, after the one that made it superfluous: a row must never name what is gone. Who puts
+/// the same bytes again looks for them after its own row is written (jobs::planPath).
+Result<void> Store::dropUnnamed(const BlobId& blob) {
+  return guarded("dropping old points", [&] {
+    return inTransaction(state_->sql, [&]() -> Result<void> {
+      int named = 0;
+      state_->sql << "SELECT (SELECT COUNT(*) FROM paths WHERE point_volume = :a)"
+                     " + (SELECT COUNT(*) FROM recordings WHERE bytes = :b)"
+                     " + (SELECT COUNT(*) FROM cases WHERE :c IN (ct, label_blob, roi, model, mesh))",
+          into(named), use(blob), use(blob), use(blob);
+      if (named == 0) state_->blobs.remove(blob);
+      return {};
+    });
   });
 }
 
@@ -317,6 +434,7 @@ Result<Recording> Store::addRecording(Recording wanted) {
     if (selectPaths(state_->sql, "WHERE id = :id", wanted.path_id).empty()) {
       return fail(ErrorCode::NotFound, "there is no path " + shown(wanted.path_id));
     }
+    state_->sql << "UPDATE paths SET drilled = 1 WHERE id = :id", use(wanted.path_id);
     if (wanted.id.empty()) wanted.id = randomId('r');
     wanted.created = timestamp();
     const auto cycles = static_cast<long long>(wanted.cycles);

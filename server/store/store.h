@@ -26,7 +26,7 @@ struct Case {
   std::string label_source;         ///< "" (no label yet), "imported" or "segmented"
   std::string figures_json = "{}";  ///< what reconstruct measured
   BlobId ct, label_blob, roi, model, mesh;
-  int paths = 0, recordings = 0;  ///< counted when read
+  int paths = 0, recordings = 0;  ///< counted when read; paths without the retired ones
 };
 
 struct Path {
@@ -35,6 +35,9 @@ struct Path {
   point_volume::Lattice lattice;
   std::uint64_t points_alive = 0;
   BlobId point_volume;
+  bool drilled = false;          ///< somebody began to drill it: under this id it never changes again
+  bool retired = false;          ///< replaced or deleted since; still there for what was drilled on it
+  std::string replaced_by = {};  ///< the id that took its place; may be empty
 };
 
 struct Recording {
@@ -74,8 +77,17 @@ class Store {
   [[nodiscard]] Result<void> setReconstruction(const std::string& case_id, const Reconstruction& made);
 
   [[nodiscard]] Result<Path> addPath(Path wanted);
-  [[nodiscard]] Result<std::vector<Path>> paths(const std::string& case_id);  ///< oldest first
+  [[nodiscard]] Result<std::vector<Path>> paths(const std::string& case_id);  ///< oldest first, none that is retired
+  /// Retired ones too.
   [[nodiscard]] Result<Path> findPath(const std::string& case_id, const std::string& path_id);
+  /// As findPath, and from now on it never changes under this id.
+  [[nodiscard]] Result<Path> findPathToDrill(const std::string& case_id, const std::string& path_id);
+  /// Puts `wanted` in the place of the path `wanted.id`. While nobody has drilled that, it keeps its id and its old
+  /// points are removed; once somebody has, it is retired as it is, and the answer has a new id.
+  /// @error NotFound also for a path that is retired already.
+  [[nodiscard]] Result<Path> replacePath(Path wanted);
+  /// Takes a path out of the plan: removed with its points, or retired when somebody has drilled it (the answer says).
+  [[nodiscard]] Result<Path> removePath(const std::string& case_id, const std::string& path_id);
 
   /// Keeps `wanted.id` when it is not empty (a live recording has its name before it is finished).
   [[nodiscard]] Result<Recording> addRecording(Recording wanted);
@@ -84,6 +96,7 @@ class Store {
 
  private:
   struct State;
+  [[nodiscard]] Result<void> dropUnnamed(const BlobId& blob);
   explicit Store(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };

@@ -70,7 +70,9 @@ TEST_F(Contract, EveryDocumentedRouteAnswersWithTheDocumentedKeys) {
                     .value()["recording_id"];
   }
   const Server server(folder.path().string());
-  const json bodies{{"addPath", {{"entry_patient", {0, 0, 0}}, {"target_patient", {0, 0, 3}}, {"spacing_mm", 0.5}}},
+  const json path{{"entry_patient", {0, 0, 0}}, {"target_patient", {0, 0, 3}}, {"spacing_mm", 0.5}};
+  const json bodies{{"addPath", path},
+                    {"replacePath", path},
                     {"addSession", {{"case_id", small.case_id}, {"path_id", small.path_id}}}};
   for (const auto& [pattern, item] : document_["paths"].items()) {
     std::string url = pattern;
@@ -78,12 +80,18 @@ TEST_F(Contract, EveryDocumentedRouteAnswersWithTheDocumentedKeys) {
              {"{id}", small.case_id}, {"{path_id}", small.path_id}, {"{recording_id}", recording}}) {
       if (const auto at = url.find(name); at != std::string::npos) url.replace(at, name.size(), value);
     }
-    for (const char* method : {"get", "post"}) {
+    for (const std::string method : {"get", "post", "put", "delete"}) {
       if (!item.contains(method)) continue;
       const json& operation = item[method];
       const std::string success = operation["responses"].begin().key();
-      const Reply reply = std::string(method) == "get" ? get(server.port(), url)
-                                                       : post(server.port(), url, bodies.at(operation["operationId"]));
+      // The path was drilled: changed or deleted, it stays where it was.
+      std::string verb = method;
+      for (char& c : verb) c = static_cast<char>(c - 'a' + 'A');
+      const json body = bodies.value(operation["operationId"].get<std::string>(), json());
+      if (method == "delete") url = post(server.port(), url.substr(0, url.rfind('/')), path).header("location");
+      const Reply reply = body.is_null()
+                              ? ask(server.port(), {verb, url})
+                              : ask(server.port(), {verb, url, body.dump(), {"Content-Type: application/json"}});
       EXPECT_EQ(std::to_string(reply.status), success) << url << " " << reply.body.substr(0, 200);
       const json& content = operation["responses"][success]["content"];
       ASSERT_TRUE(content.contains(reply.header("content-type"))) << url;

@@ -175,7 +175,73 @@ TEST_F(Rest, PlansAPath) {
   EXPECT_EQ(path["lead_mm"], 4.0);
   EXPECT_GT(path["points_alive"], 0);
   EXPECT_LT(path["points_alive"], path["points"]);
-  EXPECT_EQ(get(port(), reply.header("location")).status, 200);
+  EXPECT_EQ(get(port(), reply.header("location")).json(), path);
+}
+
+Reply put(int port, const std::string& url, const json& body) {
+  return ask(port, {"PUT", url, body.dump(), {"Content-Type: application/json"}});
+}
+
+TEST_F(Rest, ReplacesAPathAndItsPointsUnderTheSameAddress) {
+  json wanted{{"label", "first"}, {"entry_patient", {0, 0, 0}}, {"target_patient", {0, 0, 5}}, {"spacing_mm", 0.5}};
+  const Reply made = post(port(), caseUrl("/paths"), wanted);
+  ASSERT_EQ(made.status, 201) << made.body;
+  const std::string url = made.header("location");
+  const std::string points = get(port(), url + "/point-volume").body;
+  wanted["target_patient"] = {1, 0, 7}, wanted["label"] = "second";
+  const Reply replaced = put(port(), url, wanted);
+  ASSERT_EQ(replaced.status, 200) << replaced.body;
+  EXPECT_EQ(replaced.json()["id"], made.json()["id"]);
+  EXPECT_EQ(get(port(), url).json(), replaced.json());
+  EXPECT_EQ(get(port(), url).json()["label"], "second");
+  EXPECT_NE(get(port(), url + "/point-volume").body, points);
+  wanted["target_patient"] = {0, 0, 5};
+  ASSERT_EQ(put(port(), url, wanted).status, 200);
+  EXPECT_EQ(get(port(), url + "/point-volume").body, points) << "undone: the same points again";
+
+  const Reply removed = ask(port(), {"DELETE", url});
+  EXPECT_EQ(removed.json(), (json{{"id", made.json()["id"]}, {"kept", false}}));
+  expectProblem(get(port(), url), 404);
+  expectProblem(ask(port(), {"DELETE", url}), 404);
+  expectProblem(put(port(), url, wanted), 404);
+}
+
+TEST_F(Rest, RefusesAReplacementThatCannotBePlannedAndKeepsThePath) {
+  json wanted{{"entry_patient", {0, 0, 0}}, {"target_patient", {0, 0, 5}}, {"spacing_mm", 0.5}};
+  const std::string url = post(port(), caseUrl("/paths"), wanted).header("location");
+  const json before = get(port(), url).json();
+  wanted["target_patient"] = {0, 0, 0};
+  expectProblem(put(port(), url, wanted), 422);
+  wanted["entry_patient"] = {0, 0, -90}, wanted["target_patient"] = {0, 0, -80};
+  expectProblem(put(port(), url, wanted), 422);  // no bone there
+  expectProblem(ask(port(), {"PUT", url, "{"}), 415);
+  expectProblem(put(port(), "/api/v1/cases/" + bare_ + url.substr(url.find("/paths")), wanted), 404);
+  EXPECT_EQ(get(port(), url).json(), before);
+  ASSERT_EQ(ask(port(), {"DELETE", url}).status, 200);
+}
+
+TEST_F(Rest, APathThatASessionWasMadeForIsRetiredRatherThanChanged) {
+  json wanted{{"entry_patient", {0, 0, 0}}, {"target_patient", {0, 0, 5}}, {"spacing_mm", 0.5}};
+  const Reply made = post(port(), caseUrl("/paths"), wanted);
+  const std::string url = made.header("location"), id = made.json()["id"];
+  const std::string points = get(port(), url + "/point-volume").body;
+  ASSERT_EQ(post(port(), "/api/v1/sessions", {{"case_id", small_.case_id}, {"path_id", id}}).status, 201);
+  wanted["target_patient"] = {1, 0, 7};
+  const Reply replaced = put(port(), url, wanted);
+  ASSERT_EQ(replaced.status, 200) << replaced.body;
+  EXPECT_NE(replaced.json()["id"], id);
+  const json old = get(port(), url).json();
+  EXPECT_EQ(old["retired"], true);
+  EXPECT_EQ(old["replaced_by"], replaced.json()["id"]);
+  EXPECT_EQ(old["target_patient"], json({0.0, 0.0, 5.0}));
+  EXPECT_EQ(get(port(), url + "/point-volume").body, points) << "what the drill starts from is still there";
+  const json shown = get(port(), caseUrl()).json();
+  for (const json& path : shown["paths"]) EXPECT_NE(path["id"], id);
+  const std::string next = caseUrl("/paths/" + replaced.json()["id"].get<std::string>());
+  ASSERT_EQ(post(port(), "/api/v1/sessions", {{"case_id", small_.case_id}, {"path_id", replaced.json()["id"]}}).status,
+            201);
+  EXPECT_EQ(ask(port(), {"DELETE", next}).json()["kept"], true);
+  EXPECT_EQ(get(port(), next + "/point-volume").status, 200);
 }
 
 TEST_F(Rest, RefusesWhatCannotBePlannedWithTheReason) {

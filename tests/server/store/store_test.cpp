@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "server/store/ids.h"
+#include "server/store/schema.h"
 #include "tests/server/temporary_folder.h"
 
 namespace spinaltap::store {
@@ -126,6 +127,113 @@ TEST(Store, DoesNotServeAPathUnderAnotherCase) {
   EXPECT_EQ(store.findPath(b, path).error().code, ErrorCode::NotFound);
 }
 
+/// Points of bytes of their own, so that it can be seen whether they are still there.
+Path pathWithPoints(Store& store, const std::string& case_id, char content) {
+  Path wanted = examplePath(case_id);
+  wanted.point_volume = store.blobs().put(std::vector<std::byte>(100, std::byte(content)), Gzip::Sibling).value();
+  return wanted;
+}
+
+TEST(Store, APathThatNobodyDrilledKeepsItsIdWhenItIsReplacedAndItsOldPointsGo) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string id = store.addCase(exampleCase()).value().id;
+  const Path old = store.addPath(pathWithPoints(store, id, 'o')).value();
+  Path wanted = pathWithPoints(store, id, 'n');
+  wanted.id = old.id, wanted.label = "moved", wanted.path.target_patient = {9, 9, 9};
+  const Path replaced = store.replacePath(wanted).value();
+  EXPECT_EQ(replaced.id, old.id);
+  const auto listed = store.paths(id).value();
+  ASSERT_EQ(listed.size(), 1u);
+  EXPECT_EQ(listed[0].label, "moved");
+  EXPECT_EQ(listed[0].path.target_patient, wanted.path.target_patient);
+  EXPECT_EQ(store.blobs().file(old.point_volume).error().code, ErrorCode::NotFound);
+  EXPECT_TRUE(store.blobs().gzipFile(old.point_volume).empty());
+  EXPECT_TRUE(store.blobs().get(replaced.point_volume).has_value());
+}
+
+TEST(Store, ADrilledPathStaysAsItWasForItsRecordingsWhenItIsReplaced) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string id = store.addCase(exampleCase()).value().id;
+  const Path old = store.addPath(pathWithPoints(store, id, 'o')).value();
+  ASSERT_TRUE(store.findPathToDrill(id, old.id).value().drilled);
+  Path wanted = pathWithPoints(store, id, 'n');
+  wanted.id = old.id, wanted.path.target_patient = {9, 9, 9};
+  const Path replaced = store.replacePath(wanted).value();
+  EXPECT_NE(replaced.id, old.id);
+  EXPECT_FALSE(replaced.drilled);
+  const auto listed = store.paths(id).value();
+  ASSERT_EQ(listed.size(), 1u) << "the old one is no longer in the plan";
+  EXPECT_EQ(listed[0].id, replaced.id);
+  EXPECT_EQ(store.findCase(id).value().paths, 1);
+  // A drill that was under way ends afterwards, and finds all that it started from.
+  ASSERT_TRUE(store.addRecording({"", id, old.id, "", 7, true, "{}", std::string(64, 'c')}).has_value());
+  const Path found = store.findPath(id, old.id).value();
+  EXPECT_TRUE(found.retired);
+  EXPECT_EQ(found.replaced_by, replaced.id);
+  EXPECT_EQ(found.path.target_patient, old.path.target_patient);
+  EXPECT_TRUE(store.blobs().get(found.point_volume).has_value());
+  const auto again = store.replacePath(wanted);
+  ASSERT_FALSE(again.has_value()) << "the place is taken";
+  EXPECT_EQ(again.error().message, "path " + old.id + " is no longer in the plan: path " + replaced.id + " is");
+}
+
+TEST(Store, PointsThatAnotherPathNamesStayWhenOneIsRemoved) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string id = store.addCase(exampleCase()).value().id;
+  const Path a = store.addPath(pathWithPoints(store, id, 's')).value();
+  const Path b = store.addPath(pathWithPoints(store, id, 's')).value();
+  ASSERT_EQ(a.point_volume, b.point_volume);
+  ASSERT_TRUE(store.removePath(id, a.id).has_value());
+  EXPECT_EQ(store.findPath(id, a.id).error().code, ErrorCode::NotFound);
+  EXPECT_TRUE(store.blobs().get(b.point_volume).has_value());
+  ASSERT_TRUE(store.removePath(id, b.id).has_value());
+  EXPECT_EQ(store.blobs().get(b.point_volume).error().code, ErrorCode::NotFound);
+  EXPECT_EQ(store.removePath(id, b.id).error().code, ErrorCode::NotFound);
+}
+
+TEST(Store, ADrilledPathThatIsRemovedIsOnlyTakenOutOfThePlan) {
+  const test::TemporaryFolder folder;
+  auto store = Store::open(folder.path()).value();
+  const std::string id = store.addCase(exampleCase()).value().id;
+  const Path path = store.addPath(pathWithPoints(store, id, 'p')).value();
+  ASSERT_TRUE(store.addRecording({"", id, path.id, "", 7, true, "{}", std::string(64, 'c')}).has_value());
+  EXPECT_TRUE(store.removePath(id, path.id).value().drilled);
+  EXPECT_TRUE(store.paths(id).value().empty());
+  EXPECT_TRUE(store.findPath(id, path.id).value().retired);
+  EXPECT_TRUE(store.blobs().get(path.point_volume).has_value());
+}
+
+TEST(Store, AFolderOfTheFirstVersionIsBroughtUpToDateWithItsDrilledPaths) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directories(folder.path());
+  sqlite3* sql = nullptr;
+  ASSERT_EQ(sqlite3_open((folder.path() / "spinaltap.db").c_str(), &sql), SQLITE_OK);
+  std::string old = "CREATE TABLE schema_version (version INTEGER NOT NULL); INSERT INTO schema_version VALUES (1);";
+  for (const char* statement : kMigrations[0]) old += statement == nullptr ? "" : std::string(statement) + ";";
+  const std::string zero =
+      "{\"dims\":[1,1,1],\"spacing_mm\":[1,1,1],\"origin_patient\":[0,0,0],"
+      "\"direction\":[[1,0,0],[0,1,0],[0,0,1]]}";
+  old += "INSERT INTO cases VALUES ('c22','old','',0,'" + zero + "','','{}','','','','','');";
+  const std::string path =
+      "{\"entry_patient\":[0,0,0],\"target_patient\":[0,0,9],\"bit\":{\"diameter_mm\":3,"
+      "\"cone_length_mm\":5,\"length_mm\":50},\"volume_radius_mm\":4,\"lead_mm\":4,"
+      "\"spacing_mm\":0.1,\"lattice\":{\"spacing_mm\":0.1,\"rings\":40,\"discs\":130,"
+      "\"first_disc\":-40}}";
+  old += "INSERT INTO paths VALUES ('p22','c22','a','','" + path + "',5,'');";
+  old += "INSERT INTO paths VALUES ('p33','c22','b','','" + path + "',5,'');";
+  old += "INSERT INTO recordings VALUES ('r22','c22','p22','',1,1,'{}','');";
+  ASSERT_EQ(sqlite3_exec(sql, old.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(sql);
+  sqlite3_close(sql);
+  auto store = Store::open(folder.path()).value();
+  const auto paths = store.paths("c22").value();
+  ASSERT_EQ(paths.size(), 2u);
+  EXPECT_TRUE(paths[0].drilled);
+  EXPECT_FALSE(paths[1].drilled);
+}
+
 TEST(Store, SeveralProcessesWriteTogether) {
   const test::TemporaryFolder folder;
   constexpr int kProcesses = 4, kCases = 12;
@@ -180,7 +288,7 @@ TEST(Store, RefusesAFolderMadeByANewerProgram) {
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
   EXPECT_EQ(refused.error().message,
-            "data folder: made by a newer version of spinaltap (schema 99, this program knows 1)");
+            "data folder: made by a newer version of spinaltap (schema 99, this program knows 2)");
 }
 
 TEST(Store, RefusesWhatIsNotADataBase) {
