@@ -370,7 +370,7 @@ Result<Path> Store::replacePath(Path wanted) {
   BlobId old_points;
   auto replaced = guarded("replacing a path", [&] {
     return inTransaction(state_->sql, [&]() -> Result<Path> {
-      const auto old = plannedPath(state_->sql, wanted.case_id, wanted.id);
+      auto old = plannedPath(state_->sql, wanted.case_id, wanted.id);
       if (!old) return old;
       if (old->drilled) {
         insertPath(state_->sql, wanted);

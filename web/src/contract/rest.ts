@@ -36,7 +36,23 @@ export interface PathInfo {
   lattice: Lattice;
   points: number;
   points_alive: number;
+  /** No longer in the plan: replaced or deleted since it was drilled. */
+  retired: boolean;
+  /** The id in its place; empty when there is none. */
+  replaced_by: string;
 }
+
+/** What a picture needs of a path, planned or only being planned. */
+export type DrawnPath = Pick<
+  PathInfo,
+  "id" | "label" | "entry_patient" | "target_patient" | "bit" | "length_mm" | "frame"
+>;
+
+/** What the server is asked to plan. */
+export type NewPath = Pick<
+  PathInfo,
+  "label" | "entry_patient" | "target_patient" | "bit" | "volume_radius_mm" | "lead_mm" | "spacing_mm"
+>;
 
 export type Metrics = Record<string, unknown>;
 

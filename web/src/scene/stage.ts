@@ -122,10 +122,13 @@ export class Stage {
   pathGroup(frame: PathFrame): Group {
     const group = new Group();
     group.matrixAutoUpdate = false;
-    group.matrix.copy(this.pathMatrix(frame));
-    group.matrixWorldNeedsUpdate = true;
+    this.movePathGroup(group, frame);
     this.world.add(group);
     return group;
+  }
+  movePathGroup(group: Group, frame: PathFrame): void {
+    group.matrix.copy(this.pathMatrix(frame));
+    group.matrixWorldNeedsUpdate = true;
   }
 
   pathMatrix(frame: PathFrame): Matrix4 {

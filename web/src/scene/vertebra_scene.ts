@@ -1,10 +1,10 @@
 // What every room with a picture shows: the vertebra, its paths, the bit, and along the chosen path the points.
 import { Group, type Matrix4, Vector3 } from "three";
 import type { Lattice, PointVolumeBody, Vec3 } from "../contract/bodies";
-import type { PathInfo } from "../contract/rest";
+import type { DrawnPath } from "../contract/rest";
 import { screenAcross } from "../geometry/screen";
 import { boundsOf } from "../geometry/slice";
-import { directionToLocal, directionToPatient, dot, toPatient } from "../geometry/vec";
+import { add, directionToLocal, directionToPatient, dot, toPatient } from "../geometry/vec";
 import type { CaseData } from "../state/case_data";
 import type { SplatChange } from "../worker/messages";
 import { acrossAxes } from "../worker/motion";
@@ -27,7 +27,7 @@ export class VertebraScene {
   private readonly guides: GuidePlanes | null;
   private readonly cap: SectionCap | null;
   private readonly path_groups = new Group();
-  private path: PathInfo | null = null;
+  private path: DrawnPath | null = null;
   private path_group: Group | null = null;
   private lattice: Lattice | null = null;
   private cut_away = false;
@@ -63,7 +63,7 @@ export class VertebraScene {
   }
 
   /** Every path of the case, the chosen one bright, with the bit standing before its entry. `marks`: balls at the ends. */
-  showPaths(paths: PathInfo[], chosen: PathInfo | null, marks = true): void {
+  showPaths(paths: DrawnPath[], chosen: DrawnPath | null, marks = true): void {
     for (const group of [...this.path_groups.children]) {
       (group.children[0] as PathModel).dispose();
       this.path_groups.remove(group);
@@ -77,7 +77,12 @@ export class VertebraScene {
     this.stage.invalidate();
   }
 
-  private choose(path: PathInfo | null): void {
+  private choose(path: DrawnPath | null): void {
+    if (path && this.path && this.path_group && sameBit(path, this.path)) {
+      this.path = path;
+      this.stage.movePathGroup(this.path_group, path.frame);
+      return;
+    }
     this.bit?.dispose();
     if (this.path_group) this.stage.world.remove(this.path_group);
     this.bit = null;
@@ -204,6 +209,24 @@ export class VertebraScene {
     this.stage.lookAlong(from, this.stage.place(path.entry_patient), 78);
   }
 
+  /** Where a patient point is in the picture, 0 .. 1 from its left and top; null behind the viewer. */
+  pictureOf(patient: Vec3): { x: number; y: number } | null {
+    const seen = this.stage.place(patient).project(this.stage.camera);
+    return Math.abs(seen.z) > 1 ? null : { x: (seen.x + 1) / 2, y: (1 - seen.y) / 2 };
+  }
+
+  /** A patient point moved by CSS pixels on the screen, at its own distance from the viewer. */
+  movedOnScreen(patient: Vec3, right_px: number, down_px: number): Vec3 {
+    const mm = this.stage.mmPerPixel(this.stage.place(patient));
+    return this.movedAcross(patient, right_px * mm, -down_px * mm, 0);
+  }
+  /** Moved by mm along what the eye calls right, up and away. */
+  movedAcross(patient: Vec3, right_mm: number, up_mm: number, away_mm: number): Vec3 {
+    const { right, up, away } = this.screenAxes();
+    const moved = right.multiplyScalar(right_mm).addScaledVector(up, up_mm).addScaledVector(away, away_mm);
+    return add(patient, [moved.x, moved.y, moved.z]);
+  }
+
   isOnBit(event: { clientX: number; clientY: number }): boolean {
     return this.bit !== null && this.stage.rayAt(event).intersectObject(this.bit.grip).length > 0;
   }
@@ -270,4 +293,13 @@ export class VertebraScene {
     this.stage.bone.uCutNormal.value.copy(normal);
     this.cap?.place(point, normal);
   }
+}
+
+function sameBit(a: DrawnPath, b: DrawnPath): boolean {
+  return (
+    a.id === b.id &&
+    a.bit.diameter_mm === b.bit.diameter_mm &&
+    a.bit.cone_length_mm === b.bit.cone_length_mm &&
+    a.bit.length_mm === b.bit.length_mm
+  );
 }

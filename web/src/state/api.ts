@@ -6,7 +6,15 @@ import {
   type MeshBody,
   type VolumeBody,
 } from "../contract/bodies";
-import type { CaseDetail, CaseSummary, Problem, RecordingInfo, SessionInfo } from "../contract/rest";
+import type {
+  CaseDetail,
+  CaseSummary,
+  NewPath,
+  PathInfo,
+  Problem,
+  RecordingInfo,
+  SessionInfo,
+} from "../contract/rest";
 
 export class ApiError extends Error {
   override name = "ApiError";
@@ -72,12 +80,25 @@ export async function fetchPointVolume(case_id: string, path_id: string) {
 export function fetchRecording(id: string): Promise<Uint8Array<ArrayBuffer>> {
   return bytes(`/recordings/${part(id)}`);
 }
+function sent(method: string, body: unknown): RequestInit {
+  return { method, headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
+}
+/** Also a path that is no longer in the plan. */
+export function fetchPath(case_id: string, path_id: string): Promise<PathInfo> {
+  return json<PathInfo>(`/cases/${part(case_id)}/paths/${part(path_id)}`);
+}
+export function addPath(case_id: string, path: NewPath): Promise<PathInfo> {
+  return json<PathInfo>(`/cases/${part(case_id)}/paths`, sent("POST", path));
+}
+/** The answer has another id when the path was drilled: that one stays as it was. */
+export function replacePath(case_id: string, path_id: string, path: NewPath): Promise<PathInfo> {
+  return json<PathInfo>(`/cases/${part(case_id)}/paths/${part(path_id)}`, sent("PUT", path));
+}
+export async function removePath(case_id: string, path_id: string): Promise<void> {
+  await request(`/cases/${part(case_id)}/paths/${part(path_id)}`, { method: "DELETE" });
+}
 export function createSession(case_id: string, path_id: string): Promise<SessionInfo> {
-  return json<SessionInfo>("/sessions", {
-    method: "POST",
-    headers: { "content-type": "application/json" },
-    body: JSON.stringify({ case_id, path_id }),
-  });
+  return json<SessionInfo>("/sessions", sent("POST", { case_id, path_id }));
 }
 export function socketUrl(session_id: string): string {
   const scheme = location.protocol === "https:" ? "wss:" : "ws:";

@@ -2,7 +2,7 @@
 import type { MeshBody, Vec3, VolumeBody } from "../contract/bodies";
 import type { CaseDetail, PathInfo } from "../contract/rest";
 import { boundsOf } from "../geometry/slice";
-import { fetchCase, fetchMesh, fetchVolume } from "./api";
+import { fetchCase, fetchMesh, fetchPath, fetchVolume } from "./api";
 
 export interface CaseData {
   detail: CaseDetail;
@@ -41,4 +41,9 @@ function centreOf(mesh: MeshBody | null, volume: VolumeBody | null): Vec3 {
 
 export function pathOf(detail: CaseDetail, path_id: string | null): PathInfo | null {
   return detail.paths.find((path) => path.id === path_id) ?? null;
+}
+
+/** Also one that was changed or deleted since it was drilled: it is no longer listed, but still there. */
+export async function pathAsDrilled(detail: CaseDetail, path_id: string): Promise<PathInfo> {
+  return pathOf(detail, path_id) ?? (await fetchPath(detail.id, path_id));
 }

@@ -55,6 +55,12 @@ export function followAddress(): void {
   read();
 }
 
+/** The same place under another address, e.g. a path that has got its id: nothing for Back to return to. */
+export function renameTo(next: Route): void {
+  history.replaceState(null, "", addressOf(next));
+  route.value = next;
+}
+
 export function goTo(next: Route): void {
   location.hash = addressOf(next);
 }

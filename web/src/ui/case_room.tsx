@@ -1,28 +1,54 @@
-// Case: the vertebra in 3-D with its three slices, the planned paths, and the way to Drill and Replay.
-import { useSignal, useSignalEffect } from "@preact/signals";
-import { useEffect, useMemo, useRef } from "preact/hooks";
+// Case: the vertebra in 3-D with its three slices, its plan, which is edited here, and the way to Drill and Replay.
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
 import type { Vec3 } from "../contract/bodies";
-import type { CaseDetail, PathInfo, RecordingInfo } from "../contract/rest";
-import { bitSolid, holeSolid } from "../geometry/section";
-import { kBoneWindow, kPlanes, type Window } from "../geometry/slice";
-import { add, mix, scale, toPatient } from "../geometry/vec";
-import type { VertebraScene } from "../scene/vertebra_scene";
-import { meshFileUrl } from "../state/api";
+import type { CaseDetail, RecordingInfo } from "../contract/rest";
+import { fetchPath, meshFileUrl } from "../state/api";
 import { type CaseData, loadCase, pathOf } from "../state/case_data";
 import { useLoaded } from "../state/load";
-import { addressOf, goTo } from "../state/route";
-import { caseCrumbs, counted, Failure, TopBar, Waiting, whenText } from "./parts";
-import { Toggle } from "./scene_tools";
-import { SceneView } from "./scene_view";
-import { type SliceLine, type SliceMark, SliceView } from "./slice_view";
+import { type PlanSession, planSessionOf } from "../state/plan_session";
+import { addressOf, goTo, renameTo } from "../state/route";
+import { caseCrumbs, Fact, Failure, TopBar, Waiting, whenText } from "./parts";
+import { PlanPanel } from "./plan_panel";
+import { PlanViews } from "./plan_views";
+
+interface OpenCase {
+  data: CaseData;
+  session: PlanSession;
+}
+
+async function openCase(case_id: string, path_id: string | null): Promise<OpenCase> {
+  const data = await loadCase(case_id);
+  const session = planSessionOf(data.detail);
+  const now = path_id && (await pathNow(data.detail, path_id));
+  if (now) session.choose(now);
+  return { data, session };
+}
+
+/** Links to a path stay good after it was replaced: the one in its place is opened. */
+async function pathNow(detail: CaseDetail, path_id: string): Promise<string | null> {
+  for (let id = path_id, hops = 0; id !== "" && hops < 50; ++hops) {
+    if (pathOf(detail, id)) return id;
+    try {
+      id = (await fetchPath(detail.id, id)).replaced_by;
+    } catch {
+      return null;
+    }
+  }
+  return null;
+}
 
 export function CaseRoom({ case_id, path_id }: { case_id: string; path_id: string | null }) {
   const attempt = useSignal(0);
-  const loaded = useLoaded(`${case_id} ${attempt.value}`, () => loadCase(case_id)).value;
+  const loaded = useLoaded(`${case_id} ${attempt.value}`, () => openCase(case_id, path_id)).value;
   return (
     <div class="page fixed">
       <TopBar
-        crumbs={caseCrumbs(case_id, loaded.state === "ready" ? loaded.value.detail.label : case_id, null)}
+        crumbs={caseCrumbs(
+          case_id,
+          loaded.state === "ready" ? loaded.value.data.detail.label : case_id,
+          null,
+        )}
       />
       <main id="main" class="room" tabIndex={-1}>
         {loaded.state === "loading" && <Waiting text="Fetching the case: its CT and its surface" />}
@@ -35,28 +61,54 @@ export function CaseRoom({ case_id, path_id }: { case_id: string; path_id: strin
             }}
           />
         )}
-        {loaded.state === "ready" && <Opened data={loaded.value} path_id={path_id} />}
+        {loaded.state === "ready" && <Opened {...loaded.value} path_id={path_id} />}
       </main>
     </div>
   );
 }
 
-function Opened({ data, path_id }: { data: CaseData; path_id: string | null }) {
+function Opened({ data, session, path_id }: OpenCase & { path_id: string | null }) {
   const { detail } = data;
-  const path = pathOf(detail, path_id) ?? detail.paths[0] ?? null;
+  const point = useSignal<Vec3>(data.centre);
+  useAddress(detail.id, session, path_id);
   if (!data.mesh || !data.volume) return <NotReconstructed detail={detail} />;
   return (
     <div class="case-room">
-      <Views data={data} path={path} />
+      <PlanViews data={data} session={session} point={point} />
       <aside class="panel" aria-label="Paths and recordings">
         <h1 class="panel-title">{detail.label}</h1>
-        <Paths detail={detail} chosen={path} />
+        <PlanPanel
+          session={session}
+          case_id={detail.id}
+          point={() => point.peek()}
+          middle_x={data.centre[0]}
+          onChoose={(key) => {
+            session.choose(key);
+            const id = session.kept.peek().get(key)?.id;
+            if (id) goTo({ room: "case", case_id: detail.id, path_id: id });
+          }}
+        />
         <Recordings detail={detail} />
         <Figures figures={detail.figures} />
         <Downloads case_id={detail.id} />
       </aside>
     </div>
   );
+}
+
+/** The address names the chosen path, once the server has an id for it; Back and links choose another. */
+function useAddress(case_id: string, session: PlanSession, path_id: string | null): void {
+  useEffect(() => {
+    if (path_id && [...session.kept.peek().values()].some(({ id }) => id === path_id))
+      session.choose(path_id);
+  }, [path_id]);
+  const chosen = session.chosen.value;
+  const id = chosen && session.kept.value.get(chosen.key)?.id;
+  const edited = session.history.value.past.length > 0;
+  useEffect(() => {
+    if (id && id !== path_id && (path_id !== null || edited))
+      renameTo({ room: "case", case_id, path_id: id });
+  }, [id, edited]);
 }
 
 function NotReconstructed({ detail }: { detail: CaseDetail }) {
@@ -69,151 +121,6 @@ function NotReconstructed({ detail }: { detail: CaseDetail }) {
       <p>Then reload this page.</p>
     </section>
   );
-}
-
-export function sliceMarks(
-  paths: PathInfo[],
-  chosen: PathInfo | null,
-  bit: { tip: Vec3; axis: Vec3 } | null,
-): { marks: SliceMark[]; lines: SliceLine[] } {
-  const marks: SliceMark[] = [];
-  const lines: SliceLine[] = [];
-  for (const path of paths) {
-    const z = path.frame.axes[2];
-    const mine = path.id === chosen?.id;
-    const solid = holeSolid(path.entry_patient, z, path.length_mm, path.bit.diameter_mm);
-    marks.push({ kind: mine ? "hole" : "other", solid });
-    lines.push({
-      kind: mine ? "path" : "other",
-      from: add(path.entry_patient, scale(z, -18)),
-      to: path.target_patient,
-    });
-  }
-  if (bit && chosen) marks.push({ kind: "bit", solid: bitSolid(bit.tip, bit.axis, chosen.bit) });
-  return { marks, lines };
-}
-
-function Views({ data, path }: { data: CaseData; path: PathInfo | null }) {
-  const volume = data.volume!;
-  const scene = useRef<VertebraScene | null>(null);
-  const point = useSignal<Vec3>(data.centre);
-  const glass = useSignal(false);
-  const guides = useSignal(true);
-  const window = useSignal<Window>(kBoneWindow);
-  useEffect(() => {
-    if (path) point.value = mix(path.entry_patient, path.target_patient, 0.3);
-    scene.current?.showPaths(data.detail.paths, path);
-  }, [path?.id]);
-  useSignalEffect(() => {
-    scene.current?.setGuides(guides.value ? point.value : null);
-  });
-  useSignalEffect(() => {
-    scene.current?.setGlass(glass.value);
-  });
-  const { marks, lines } = useMemo(
-    () => sliceMarks(data.detail.paths, path, path && standing(path)),
-    [data.detail.paths, path],
-  );
-  return (
-    <div class="quad">
-      <SceneView
-        data={data}
-        label="Vertebra in 3-D"
-        onReady={(made) => {
-          scene.current = made;
-          made.showPaths(data.detail.paths, path);
-          made.setGuides(guides.value ? point.value : null);
-          return () => {
-            scene.current = null;
-          };
-        }}
-      >
-        <div class="scene-tools">
-          <Toggle text="Glass bone" on={glass} />
-          <Toggle text="Guide planes" on={guides} />
-          <button type="button" onClick={() => scene.current?.lookAlongBit()} disabled={!path}>
-            Along the bit
-          </button>
-        </div>
-      </SceneView>
-      {kPlanes.map((plane) => (
-        <SliceView
-          key={plane}
-          volume={volume}
-          plane={plane}
-          point={point}
-          window={window.value}
-          marks={marks}
-          lines={lines}
-        />
-      ))}
-    </div>
-  );
-}
-
-/** Where the bit stands before a drill: its tip a little before the entry. */
-function standing(path: PathInfo): { tip: Vec3; axis: Vec3 } {
-  return { tip: toPatient(path.frame, [0, 0, -6]), axis: path.frame.axes[2] };
-}
-
-function Paths({ detail, chosen }: { detail: CaseDetail; chosen: PathInfo | null }) {
-  if (!chosen) {
-    return (
-      <section>
-        <h2>Paths</h2>
-        <p class="dim">No path is planned. In a terminal, type:</p>
-        <pre>{`spinaltap plan ${detail.id} --entry x,y,z --target x,y,z`}</pre>
-      </section>
-    );
-  }
-  return (
-    <section>
-      <h2>Paths</h2>
-      <div class="path-list" role="radiogroup" aria-label="Path to drill">
-        {detail.paths.map((path) => (
-          <label key={path.id} class="path-card">
-            <input
-              type="radio"
-              name="path"
-              checked={path.id === chosen.id}
-              onChange={() => goTo({ room: "case", case_id: detail.id, path_id: path.id })}
-            />
-            <span class="path-name">{path.label || `Path ${path.id}`}</span>
-            <span class="dim">
-              {path.length_mm.toFixed(1)} mm, bit {path.bit.diameter_mm.toFixed(1)} mm
-            </span>
-          </label>
-        ))}
-      </div>
-      <dl class="facts">
-        <Fact name="Entry" value={pointText(chosen.entry_patient)} />
-        <Fact name="Target" value={pointText(chosen.target_patient)} />
-        <Fact
-          name="Modelled bone"
-          value={`${counted(chosen.points_alive, "point")}, ${chosen.spacing_mm} mm apart`}
-        />
-      </dl>
-      <a class="button primary" href={addressOf({ room: "drill", case_id: detail.id, path_id: chosen.id })}>
-        Drill this path
-      </a>
-    </section>
-  );
-}
-
-function Fact({ name, value }: { name: string; value: string }) {
-  return (
-    <div>
-      <dt>{name}</dt>
-      <dd>{value}</dd>
-    </div>
-  );
-}
-
-/** In the letters of the picture, not in signs. */
-function pointText([x, y, z]: Vec3): string {
-  const one = (v: number, minus: string, plus: string): string =>
-    `${v < 0 ? minus : plus} ${Math.abs(v).toFixed(1)}`;
-  return `${one(x, "R", "L")}  ${one(y, "A", "P")}  ${one(z, "F", "H")} mm`;
 }
 
 function Recordings({ detail }: { detail: CaseDetail }) {
@@ -238,7 +145,7 @@ function Recordings({ detail }: { detail: CaseDetail }) {
 
 function recordingText(detail: CaseDetail, recording: RecordingInfo): string {
   const path = pathOf(detail, recording.path_id);
-  const parts = [path?.label ?? recording.path_id, `${(recording.cycles / 1000).toFixed(1)} s`];
+  const parts = [path?.label ?? "a path changed since", `${(recording.cycles / 1000).toFixed(1)} s`];
   if (!recording.complete) parts.push("cut short");
   return parts.join(" · ");
 }

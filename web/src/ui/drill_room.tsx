@@ -7,13 +7,12 @@ import { kBoneWindow, kPlanes } from "../geometry/slice";
 import { directionToPatient, toPatient } from "../geometry/vec";
 import type { VertebraScene } from "../scene/vertebra_scene";
 import { fetchPointVolume } from "../state/api";
-import { type CaseData, loadCase, pathOf } from "../state/case_data";
+import { type CaseData, loadCase, pathAsDrilled } from "../state/case_data";
 import { DrillSession } from "../state/drill_session";
 import { useLoaded } from "../state/load";
 import { keepLocally, parseMetrics } from "../state/local_recordings";
 import { addressOf, kLocalRecording } from "../state/route";
 import { type Hand, type HandEvent, handAfter, kRestingHand, steeringOf } from "../state/steering";
-import { sliceMarks } from "./case_room";
 import { DrillControls } from "./drill_controls";
 import { attachHand } from "./drill_input";
 import { DrillReadings, ThrustChart } from "./drill_readings";
@@ -24,6 +23,7 @@ import { caseCrumbs, Failure, TopBar, Waiting } from "./parts";
 import { BitLooks, Toggle } from "./scene_tools";
 import { SceneView } from "./scene_view";
 import { ServerBadge } from "./server_badge";
+import { sliceMarks } from "./slice_marks";
 import { SliceView } from "./slice_view";
 
 interface Opened {
@@ -35,8 +35,7 @@ interface Opened {
 
 async function open(case_id: string, path_id: string): Promise<Opened> {
   const data = await loadCase(case_id);
-  const path = pathOf(data.detail, path_id);
-  if (!path) throw new Error(`This case has no path ${path_id}.`);
+  const path = await pathAsDrilled(data.detail, path_id);
   const { raw, body } = await fetchPointVolume(case_id, path_id);
   return { data, path, raw, body };
 }

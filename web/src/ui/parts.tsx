@@ -1,5 +1,6 @@
 // Small pieces that several rooms share.
 import type { ComponentChildren } from "preact";
+import type { Vec3 } from "../contract/bodies";
 import { addressOf } from "../state/route";
 
 export function Brand() {
@@ -109,4 +110,20 @@ export function whenText(created: string): string {
 /** "1 path", "2 paths". */
 export function counted(count: number, noun: string): string {
   return `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
+}
+
+export function Fact({ name, value }: { name: string; value: string }) {
+  return (
+    <div>
+      <dt>{name}</dt>
+      <dd>{value}</dd>
+    </div>
+  );
+}
+
+/** In the letters of the picture, not in signs. */
+export function pointText([x, y, z]: Vec3): string {
+  const one = (v: number, minus: string, plus: string): string =>
+    `${v < 0 ? minus : plus} ${Math.abs(v).toFixed(1)}`;
+  return `${one(x, "R", "L")}  ${one(y, "A", "P")}  ${one(z, "F", "H")} mm`;
 }

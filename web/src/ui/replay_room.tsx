@@ -5,7 +5,7 @@ import { type PointVolumeBody, pointVolume_mm3 } from "../contract/bodies";
 import type { Metrics, PathInfo } from "../contract/rest";
 import type { VertebraScene } from "../scene/vertebra_scene";
 import { fetchPointVolume, fetchRecording, findRecording } from "../state/api";
-import { type CaseData, loadCase, pathOf } from "../state/case_data";
+import { type CaseData, loadCase, pathAsDrilled } from "../state/case_data";
 import { useLoaded } from "../state/load";
 import { keptLocally } from "../state/local_recordings";
 import { ReplaySession } from "../state/replay_session";
@@ -33,7 +33,8 @@ async function open(case_id: string, recording_id: string): Promise<Opened> {
   }
   const known = findRecording(data.detail, recording_id);
   const bytes = local ?? (await fetchRecording(recording_id));
-  const path = pathOf(data.detail, known?.path_id ?? null) ?? data.detail.paths[0];
+  const drilled = known ? await pathAsDrilled(data.detail, known.path_id) : null;
+  const path = drilled ?? data.detail.paths[0];
   if (!path) throw new Error("The path of this recording is no longer there.");
   const { body } = await fetchPointVolume(case_id, path.id);
   return { data, path, body, bytes, metrics: known?.metrics ?? null };

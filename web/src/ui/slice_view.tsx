@@ -2,14 +2,10 @@
 import { type Signal, useComputed, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Vec3, VolumeBody } from "../contract/bodies";
-import type { Revolution } from "../geometry/section";
-import { sectionOf } from "../geometry/section";
 import {
   boundsOf,
-  kPlanes,
   kViews,
   type Plane,
-  patientToPixel,
   pixelToPatient,
   renderSlice,
   type SliceGeometry,
@@ -18,18 +14,13 @@ import {
   type Window,
 } from "../geometry/slice";
 import { dot } from "../geometry/vec";
-
-export interface SliceMark {
-  kind: "hole" | "bit" | "other";
-  solid: Revolution;
-}
-
-/** A line through the picture, e.g. the path's axis. */
-export interface SliceLine {
-  kind: "path" | "other";
-  from: Vec3;
-  to: Vec3;
-}
+import { kWhole, panned, type Zoom, zoomAbout, zoomed } from "../geometry/zoom";
+import { type Measuring, shownIn, withPoint } from "../state/measure";
+import { windowAfterDrag } from "../state/windowing";
+import { type PathEditing, SliceHandles } from "./path_handles";
+import { clamp, kZoomStep, moveByKey, useWheel, zoomByKey } from "./slice_input";
+import type { SliceLine, SliceMark } from "./slice_marks";
+import { MeasureTexts, Overlay } from "./slice_overlay";
 
 interface SliceViewProps {
   volume: VolumeBody;
@@ -42,10 +33,13 @@ interface SliceViewProps {
   follows?: boolean;
   /** Shows this much around the point rather than all of the CT. */
   reach_mm?: number;
+  /** Called while the window is dragged. */
+  onWindow?: (window: Window) => void;
+  editing?: PathEditing | null;
+  measuring?: Signal<Measuring>;
 }
 
 const kNames: Record<Plane, string> = { transaxial: "Transaxial", coronal: "Coronal", sagittal: "Sagittal" };
-const kStepSign: Record<Plane, number> = { transaxial: 1, coronal: 1, sagittal: 1 };
 
 export function SliceView(props: SliceViewProps) {
   const { volume, plane, point, follows } = props;
@@ -53,24 +47,22 @@ export function SliceView(props: SliceViewProps) {
   const through = view.through;
   const box = boundsOf(volume);
   const level = point.value[through];
-  const geometry = sliceGeometry(volume, plane, point.value, props.reach_mm);
+  const whole = sliceGeometry(volume, plane, point.value, props.reach_mm);
+  const zoom = useSignal<Zoom>(kWhole);
   const hover = useSignal<Vec3 | null>(null);
   const step = stepOf(volume, through);
   const page = (steps: number): void => {
     const next: Vec3 = [...point.value];
-    next[through] = clamp(
-      next[through] + steps * step * kStepSign[plane],
-      box.low[through],
-      box.high[through],
-    );
+    next[through] = clamp(next[through] + steps * step, box.low[through], box.high[through]);
     point.value = next;
   };
   const hu = useComputed(() => Math.round(samplePatient(volume, hover.value ?? point.value)));
   return (
     <section class={`slice slice-${plane}`} aria-label={`${kNames[plane]} slice`}>
-      <Picture {...props} geometry={geometry} hover={hover} page={page} />
+      <Picture {...props} whole={whole} zoom={zoom} hover={hover} page={page} step={step} />
       <span class="slice-name">
         {kNames[plane]} <span class="dim">{axisText(through, level)}</span>
+        {zoom.value.factor > 1 && <span class="dim"> {zoom.value.factor.toFixed(1)}×</span>}
       </span>
       {!follows && (
         <span class="slice-hu" data-hu={hu.value}>
@@ -102,171 +94,182 @@ export function SliceView(props: SliceViewProps) {
 }
 
 interface PictureProps extends SliceViewProps {
-  geometry: SliceGeometry;
+  whole: SliceGeometry;
+  zoom: Signal<Zoom>;
   hover: Signal<Vec3 | null>;
   page: (steps: number) => void;
+  step: number;
 }
 
-function Picture({
-  volume,
-  plane,
-  point,
-  window,
-  marks,
-  lines,
-  follows,
-  geometry,
-  hover,
-  page,
-}: PictureProps) {
+function Picture(props: PictureProps) {
+  const { volume, plane, point, window, marks, lines, follows, whole, zoom, hover, page } = props;
+  const { editing, measuring } = props;
   const canvas = useRef<HTMLCanvasElement>(null);
   const svg = useRef<SVGSVGElement>(null);
-  const through = kViews[plane].through;
-  const level = point.value[through];
+  const geometry = zoomed(whole, zoom.value);
+  const level = point.value[kViews[plane].through];
   useEffect(() => {
     const context = canvas.current!.getContext("2d")!;
     const image = context.createImageData(geometry.width, geometry.height);
     renderSlice(volume, geometry, window, image.data);
     context.putImageData(image, 0, 0);
-  }, [volume, plane, window, level, geometry.corner.join()]);
-  useWheel(svg, (event) => page(Math.sign(event.deltaY)), follows !== true);
-  const patientAt = (event: PointerEvent): Vec3 => {
-    const to_picture = svg.current!.getScreenCTM()!.inverse();
-    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(to_picture);
-    const column = clamp(at.x - 0.5, 0, geometry.width - 1);
-    const row = clamp(at.y - 0.5, 0, geometry.height - 1);
-    return pixelToPatient(geometry, column, row);
-  };
-  const pointer = (event: PointerEvent): void => {
-    if (follows) return;
-    const at = patientAt(event);
-    hover.value = at;
-    if (event.type === "pointerdown") svg.current!.setPointerCapture(event.pointerId);
-    if (event.type === "pointerdown" || event.buttons & 1) point.value = at;
+  }, [volume, plane, window, level, geometry.corner.join(), geometry.pixel_mm]);
+  const drag = usePointer(props, geometry, svg);
+  useWheel(
+    svg,
+    (event) => {
+      // Browsers turn the wheel sideways while Shift is held.
+      const turned = event.deltaY !== 0 ? event.deltaY : event.deltaX;
+      if (!event.shiftKey) return page(Math.sign(turned));
+      const [column, row] = drag.pixelAt(event);
+      zoom.value = zoomAbout(whole, zoom.value, turned < 0 ? kZoomStep : 1 / kZoomStep, column, row);
+    },
+    follows !== true,
+  );
+  const measured = measuring
+    ? shownIn(measuring.value, plane, level, props.step / 2, measuring.value.open ? hover.value : null)
+    : [];
+  const onKeyDown = (event: KeyboardEvent): void => {
+    if (follows || event.ctrlKey || event.metaKey || event.altKey) return;
+    const took =
+      setByKey(event, measuring, plane, point.value) ||
+      zoomByKey(event, whole, geometry, point.value, zoom) ||
+      moveByKey(event, geometry, point, page);
+    if (took) event.preventDefault();
   };
   return (
     <div
       class="slice-picture"
       role="group"
-      aria-label={`${kNames[plane]} picture; arrow keys move the crosshair, Page Up and Page Down turn pages`}
+      aria-label={`${kNames[plane]} picture; arrow keys move the crosshair, Page Up and Page Down turn pages, plus and minus zoom`}
       tabIndex={follows ? -1 : 0}
-      onKeyDown={(event) => {
-        if (!follows && moveByKey(event, geometry, point, page)) event.preventDefault();
-      }}
+      onKeyDown={onKeyDown}
+      style={{ "--aspect": geometry.width / geometry.height }}
     >
-      <canvas ref={canvas} width={geometry.width} height={geometry.height} />
-      <svg
-        ref={svg}
-        viewBox={`0 0 ${geometry.width} ${geometry.height}`}
-        aria-hidden="true"
-        onPointerDown={pointer}
-        onPointerMove={pointer}
-        onPointerLeave={() => {
-          hover.value = null;
-        }}
-      >
-        <Overlay geometry={geometry} point={point.value} marks={marks} lines={lines} crosshair={!follows} />
-      </svg>
+      <div class="slice-frame">
+        <canvas ref={canvas} width={geometry.width} height={geometry.height} />
+        <svg
+          ref={svg}
+          viewBox={`0 0 ${geometry.width} ${geometry.height}`}
+          aria-hidden="true"
+          onPointerDown={drag.down}
+          onPointerMove={drag.move}
+          onPointerUp={drag.up}
+          onPointerCancel={drag.up}
+          onPointerLeave={() => {
+            hover.value = null;
+          }}
+          onContextMenu={(event) => {
+            if (!follows) event.preventDefault();
+          }}
+          onDblClick={() => {
+            if (!follows) zoom.value = kWhole;
+          }}
+        >
+          <Overlay
+            geometry={geometry}
+            point={point.value}
+            marks={marks}
+            lines={lines}
+            measured={measured}
+            crosshair={!follows}
+          />
+        </svg>
+        <MeasureTexts geometry={geometry} measured={measured} />
+        {editing && (
+          <SliceHandles
+            editing={editing}
+            geometry={geometry}
+            level={level}
+            pixel_css={() => svg.current!.getScreenCTM()!.a}
+          />
+        )}
+      </div>
     </div>
   );
 }
 
-interface OverlayProps {
-  geometry: SliceGeometry;
-  point: Vec3;
-  marks: SliceMark[];
-  lines: SliceLine[];
-  crosshair: boolean;
-}
-
-function Overlay({ geometry, point, marks, lines, crosshair }: OverlayProps) {
-  const view = kViews[geometry.plane];
-  const level = point[view.through];
-  const pixel = (p: Vec3): [number, number] => {
-    const [x, y] = patientToPixel(geometry, p);
-    return [x + 0.5, y + 0.5];
-  };
-  const [x, y] = pixel(point);
-  const planeOfAxis = (axis: Vec3): Plane =>
-    kPlanes.find((plane) => kViews[plane].through === axis.findIndex((v) => v !== 0))!;
-  const bar = 10 / geometry.pixel_mm;
-  return (
-    <>
-      {lines.map((line, i) => {
-        const [x1, y1] = pixel(line.from);
-        const [x2, y2] = pixel(line.to);
-        return <line key={i} class={`mark-line mark-line-${line.kind}`} x1={x1} y1={y1} x2={x2} y2={y2} />;
-      })}
-      {marks.map((mark, i) => {
-        const polygon = sectionOf(mark.solid, view.through, level).map(pixel);
-        if (polygon.length < 3) return null;
-        return (
-          <polygon
-            key={i}
-            class={`mark mark-${mark.kind}`}
-            points={polygon.map((p) => p.join(",")).join(" ")}
-          />
-        );
-      })}
-      {crosshair && (
-        <>
-          <line class={`cross cross-${planeOfAxis(view.right)}`} x1={x} x2={x} y1={0} y2={geometry.height} />
-          <line class={`cross cross-${planeOfAxis(view.down)}`} x1={0} x2={geometry.width} y1={y} y2={y} />
-        </>
-      )}
-      <line
-        class="scale-bar"
-        x1={geometry.width - bar - 6}
-        x2={geometry.width - 6}
-        y1={geometry.height - 8}
-        y2={geometry.height - 8}
-      />
-    </>
-  );
-}
-
-/** Wheel listeners must be active ones to keep the page from scrolling; JSX makes passive ones. */
-function useWheel(target: { current: Element | null }, act: (event: WheelEvent) => void, on: boolean): void {
-  const latest = useRef(act);
-  latest.current = act;
-  useEffect(() => {
-    const element = target.current;
-    if (!element || !on) return;
-    const listener = (event: Event): void => {
-      event.preventDefault();
-      latest.current(event as WheelEvent);
-    };
-    element.addEventListener("wheel", listener, { passive: false });
-    return () => element.removeEventListener("wheel", listener);
-  }, [target, on]);
-}
-
-function moveByKey(
+/** Enter sets a point of a measurement at the crosshair: what a click does at the pointer. */
+function setByKey(
   event: KeyboardEvent,
-  geometry: SliceGeometry,
-  point: Signal<Vec3>,
-  page: (steps: number) => void,
+  measuring: Signal<Measuring> | undefined,
+  plane: Plane,
+  point: Vec3,
 ): boolean {
-  const moves: Record<string, [number, number]> = {
-    ArrowLeft: [-1, 0],
-    ArrowRight: [1, 0],
-    ArrowUp: [0, -1],
-    ArrowDown: [0, 1],
-  };
-  if (event.key === "PageUp" || event.key === "PageDown") {
-    page(event.key === "PageUp" ? 1 : -1);
-    return true;
-  }
-  const move = moves[event.key];
-  if (!move) return false;
-  const [column, row] = patientToPixel(geometry, point.value);
-  const speed = event.shiftKey ? 1 : 4;
-  point.value = pixelToPatient(
-    geometry,
-    clamp(column + move[0] * speed, 0, geometry.width - 1),
-    clamp(row + move[1] * speed, 0, geometry.height - 1),
-  );
+  if (event.key !== "Enter" || !measuring || measuring.value.tool === "crosshair") return false;
+  if (event.target !== event.currentTarget) return false;
+  measuring.value = withPoint(measuring.value, plane, point);
   return true;
+}
+
+type Drag =
+  | { kind: "crosshair" }
+  | { kind: "measure"; x: number; y: number }
+  | { kind: "window"; x: number; y: number; from: Window }
+  | { kind: "pan"; column: number; row: number };
+
+/** Farther than this, a press was a drag: it sets the second point too. */
+const kClick_px = 5;
+
+function usePointer(
+  { point, window, follows, whole, zoom, hover, onWindow, measuring, plane }: PictureProps,
+  geometry: SliceGeometry,
+  svg: { current: SVGSVGElement | null },
+) {
+  const drag = useRef<Drag | null>(null);
+  const pixelAt = (event: MouseEvent): [number, number] => {
+    const to_picture = svg.current!.getScreenCTM()!.inverse();
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(to_picture);
+    return [clamp(at.x - 0.5, 0, geometry.width - 1), clamp(at.y - 0.5, 0, geometry.height - 1)];
+  };
+  const patientAt = (event: MouseEvent): Vec3 => pixelToPatient(geometry, ...pixelAt(event));
+  const begun = (event: PointerEvent): Drag => {
+    const { clientX: x, clientY: y } = event;
+    if (onWindow && (event.button === 2 || (event.button === 0 && event.altKey)))
+      return { kind: "window", x, y, from: window };
+    if (event.button === 1) {
+      const [column, row] = pixelAt(event);
+      return { kind: "pan", column, row };
+    }
+    if (measuring && measuring.value.tool !== "crosshair") return { kind: "measure", x, y };
+    return { kind: "crosshair" };
+  };
+  const setPoint = (at: Vec3): void => {
+    measuring!.value = withPoint(measuring!.value, plane, at);
+  };
+  const move = (event: PointerEvent): void => {
+    if (follows) return;
+    const now = drag.current;
+    if (now?.kind === "window") {
+      onWindow?.(windowAfterDrag(now.from, event.clientX - now.x, event.clientY - now.y));
+      return;
+    }
+    if (now?.kind === "pan") {
+      const [column, row] = pixelAt(event);
+      zoom.value = panned(whole, zoom.value, column - now.column, row - now.row);
+      return;
+    }
+    hover.value = patientAt(event);
+    if (now?.kind === "crosshair") point.value = hover.value;
+  };
+  return {
+    pixelAt,
+    move,
+    down: (event: PointerEvent): void => {
+      if (follows) return;
+      drag.current = begun(event);
+      svg.current!.setPointerCapture(event.pointerId);
+      if (event.button === 1) event.preventDefault();
+      if (drag.current.kind === "measure") setPoint(patientAt(event));
+      else move(event);
+    },
+    up: (event: PointerEvent): void => {
+      const now = drag.current;
+      drag.current = null;
+      if (now?.kind !== "measure" || !measuring?.value.open) return;
+      if (Math.hypot(event.clientX - now.x, event.clientY - now.y) > kClick_px) setPoint(patientAt(event));
+    },
+  };
 }
 
 /** One voxel along the patient axis nearest to a grid axis. */
@@ -284,8 +287,4 @@ function axisText(through: 0 | 1 | 2, level: number): string {
     ["F", "H"],
   ][through] as [string, string];
   return `${Math.abs(level).toFixed(1)} mm ${level < 0 ? minus : plus}`;
-}
-
-function clamp(v: number, low: number, high: number): number {
-  return Math.max(low, Math.min(high, v));
 }
