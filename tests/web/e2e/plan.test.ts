@@ -180,6 +180,29 @@ describe("a path", () => {
       expect((await box.boundingBox())!.width).toBeGreaterThanOrEqual(24);
   });
 
+  test("is dragged by touch as by the mouse", async () => {
+    const target = handle(slice("Sagittal"), "Target");
+    const from = await toldBy(target);
+    const box = (await target.boundingBox())!;
+    const mm = await mmPerPixel("Sagittal");
+    const finger = await page.context().newCDPSession(page);
+    const touch = (type: "touchStart" | "touchMove" | "touchEnd", up_px: number) =>
+      finger.send("Input.dispatchTouchEvent", {
+        type,
+        touchPoints:
+          type === "touchEnd" ? [] : [{ x: box.x + box.width / 2, y: box.y + box.height / 2 - up_px }],
+      });
+    await touch("touchStart", 0);
+    for (const up_px of [3, 6, 10]) await touch("touchMove", up_px);
+    await touch("touchEnd", 10);
+    await finger.detach();
+    const to = await toldBy(target);
+    // Told to a tenth of a millimetre, before and after.
+    expect(Math.abs(to[2] - (from[2] + 10 * mm))).toBeLessThan(0.11);
+    expect(Math.abs(to[1] - from[1])).toBeLessThan(0.11);
+    expect(to[0]).toBe(from[0]);
+  });
+
   test("takes another bit, by name and by number", async () => {
     await page.locator(".bit-fields select").selectOption("Screw 6.5 × 45 mm");
     await page.getByLabel("Length, mm").fill("99");
