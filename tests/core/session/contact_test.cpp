@@ -41,14 +41,13 @@ TEST(Contact, AddsUpWhatEveryFacetMeets) {
     const Vec3 tool_x = haptics::toolX(pose.axis), tool_y = haptics::toolY(pose.axis);
     std::array<std::uint16_t, drill::Probe::kMostFacets> densities{};
     probe.look(volume, pose, tool_x, tool_y, densities);
-    double frontal = 0, rubbing = 0, push_x = 0, push_y = 0, turn = 0;
+    double frontal = 0, rubbing = 0, push_x = 0, push_y = 0;
     for (std::size_t i = 0; i < probe.count(); ++i) {
       const double hardness = densities[i] / 1850.0 * (densities[i] / 1850.0);
       const double side = hardness * probe.areaOf(i).side_mm2;
       frontal += hardness * probe.areaOf(i).frontal_mm2;
       rubbing += i < drill::Probe::kTipFacets ? 0 : side;
       push_x += side * probe.facet(i).out_x, push_y += side * probe.facet(i).out_y;
-      turn += side * std::abs(probe.facet(i).z_mm);
     }
     const haptics::Meeting meeting = contact.meet(volume, pose);
     // Sums of at most 128 terms in another order: some 1e-14 of them.
