@@ -274,7 +274,8 @@ void NearestPoints(const point_volume::Lattice& lattice, const ToolFrame& tool, 
     const int inside = static_cast<int>(at >= 0) & static_cast<int>(at < discs) & static_cast<int>(out < rings);
     const int disc = static_cast<int>(inside != 0 ? at : 0.0), ring = static_cast<int>(inside != 0 ? out : 0.0);
     const int slots = ring == 0 ? 1 : 6 * ring, start = ring == 0 ? 0 : 3 * ring * (ring - 1) + 1;
-    const int past = static_cast<int>(TurnOf(x, y) * slots + 0.5), slot = past < slots ? past : past - slots;
+    const double past = TurnOf(x, y) * slots + 0.5;
+    const int whole = static_cast<int>(past), slot = whole < slots ? whole : whole - slots;
     nearest[i] = inside != 0 ? static_cast<std::uint32_t>(disc * per_disc + start + slot) : kNoPoint;
   }
 }
